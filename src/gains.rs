@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(8),
+    format: upright::table_format!(9),
     // Number of states; equal to `NX` in a sound table.
     states: 10,
     // Number of sensors; equal to `NY` in a sound table.
@@ -107,6 +107,9 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     friction: None,
     // The motor, if described: without it the controller gives a force.
     motor: None,
+    // The drive, if it imposes the cart's acceleration: then that is the input of the plant instead of the force,
+    // and `force_limit_n` limits nothing.
+    steps: None,
     // Limits that the supervisor enforces.
     limits: Limits {
         // Soft limits of the rail, low and high (m).
@@ -163,7 +166,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         },
     },
     // CRC-32 of all values above.
-    crc: 0x3674_44bf,
+    crc: 0x467f_f796,
 };
 
 /// This table has no swing-up.

@@ -71,6 +71,7 @@ impl Invariants {
                 assert!(force.is_finite() && force.abs() <= TABLE.force_limit_n, "{force}")
             }
             Drive::Duty(duty) => assert!(duty.is_finite() && duty.abs() <= 1.0, "{duty}"),
+            Drive::Steps(_) => panic!("pulses for a motor"),
         }
         let disarmed = matches!(answered, Some((Request::Disarm, Answer::Done)));
         if enable && before == State::Jogging {

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
-use crate::table::{MotorMap, Scalar};
+use crate::table::{MotorMap, Scalar, StepMap};
 
 /// Command to the power stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +14,8 @@ pub enum Drive {
     Force(f32),
     /// A duty cycle from -1 to 1, positive along +x.
     Duty(f32),
+    /// Pulses in this tick, spread evenly, positive along +x: for drives that impose the cart's acceleration.
+    Steps(i32),
 }
 
 impl Drive {
@@ -30,11 +32,35 @@ impl Drive {
 
     /// The command as a duty cycle from -1 to 1. A force becomes a fraction of `force_limit` (N): for a power stage
     /// that controls the motor current and reaches the limit at full scale.
+    /// Pulses are no duty.
     pub fn duty(self, force_limit: f32) -> f32 {
         match self {
             Drive::Force(force) => saturate(force / force_limit, 1.0),
             Drive::Duty(duty) => saturate(duty, 1.0),
+            Drive::Steps(_) => 0.0,
         }
+    }
+
+    /// The number of the command: force (N), duty or pulses.
+    pub fn value(self) -> f32 {
+        match self {
+            Drive::Force(value) | Drive::Duty(value) => value,
+            Drive::Steps(pulses) => pulses as f32,
+        }
+    }
+}
+
+impl<T: Scalar> StepMap<T> {
+    /// The acceleration nearest to `wanted` (m/s²) that is within the limits of the drive for a tick of `tick_s` (s),
+    /// which begins at `speed` (m/s).
+    pub fn limited(&self, wanted: T, speed: T, tick_s: T) -> T {
+        let limited = saturate(wanted, self.acceleration_limit_m_per_s2);
+        let next = speed + limited * tick_s;
+        let within = saturate(next, self.speed_limit_m_per_s);
+        if within == next {
+            return limited;
+        }
+        saturate((within - speed) / tick_s, self.acceleration_limit_m_per_s2)
     }
 }
 
@@ -113,6 +139,19 @@ mod tests {
         assert_eq!(Drive::at_rest(-5.0, None), Drive::Force(-5.0));
         assert_eq!(Drive::at_rest(-2.5, Some(&MOTOR)), Drive::Duty(-0.5));
         assert_eq!(Drive::Force(f32::NAN).duty(20.0), 0.0);
+    }
+
+    #[test]
+    fn neither_acceleration_nor_speed_exceeds_the_limits_of_the_drive() {
+        let drive = StepMap { step_m: 1e-5, acceleration_limit_m_per_s2: 8.0, speed_limit_m_per_s: 1.0 };
+        assert_eq!(drive.limited(5.0, 0.5, 0.0625), 5.0);
+        assert_eq!(drive.limited(-50.0, 0.5, 0.0625), -8.0);
+        assert_eq!(drive.limited(5.0, 0.75, 0.0625), 4.0);
+        assert_eq!(drive.limited(5.0, 1.0, 0.0625), 0.0);
+        assert_eq!(drive.limited(-5.0, 1.0, 0.0625), -5.0);
+        // Faster than allowed: it brakes as hard as it can.
+        assert_eq!(drive.limited(5.0, 2.0, 0.0625), -8.0);
+        assert_eq!(drive.limited(f32::NAN, 0.5, 0.0625), 0.0);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::control::encoder::{CounterWidth, Encoders};
 use crate::control::observer::Observer;
 pub use crate::control::rejected::Rejected;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
-use crate::table::{GainTable, Law, LawGains, Scalar, TableError};
+use crate::table::{GainTable, Law, LawGains, Scalar, StepMap, TableError};
 use nalgebra::SVector;
 
 /// Observer, control law and actuator map of one gain table.
@@ -33,6 +33,8 @@ pub struct Controller<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     friction: [T; NY],
     requested: T,
     applied: T,
+    /// Pulses from position 0 that a drive with pulses has been given.
+    emitted: i32,
 }
 
 /// The law in use.
@@ -66,9 +68,9 @@ enum Mode<'t, const NX: usize, const NY: usize, T: Scalar> {
 /// Result of the first half of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorCommand<T = f32> {
-    /// Force requested by the control law (N).
+    /// Force requested by the control law (N); acceleration (m/s²) for a drive that imposes it.
     pub requested_n: T,
-    /// Force applied after all limits (N); 0 if the request is NaN.
+    /// The same after all limits; 0 if the request is NaN.
     pub applied_n: T,
     /// Command to the power stage.
     pub drive: Drive,
@@ -129,6 +131,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             friction: [zero; NY],
             requested: zero,
             applied: zero,
+            emitted: 0,
         }
     }
 
@@ -240,6 +243,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.last_volts = T::default();
         self.friction = [T::default(); NY];
         (self.requested, self.applied) = (T::default(), T::default());
+        self.emitted =
+            self.table.steps.as_ref().and_then(|steps| steps.nearest(self.position())).unwrap_or_default();
         self.mode = self.started;
     }
 
@@ -291,10 +296,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.actuate(requested)
     }
 
-    /// First half of a tick with the whole state measured, as the paper simulates it.
+    /// First half of a tick with the whole state measured, as the paper simulates it. A drive with pulses stays off:
+    /// what it knows of the cart is what it was given, not what is measured.
     pub fn control_from_state(&mut self, x: &SVector<T, NX>) -> MotorCommand<T> {
         self.estimate = *x;
-        if let Mode::Stopped = self.mode {
+        if matches!(self.mode, Mode::Stopped) || self.table.steps.is_some() {
             return Self::off();
         }
         self.state.govern(self.target, self.active.gains.setpoint_step);
@@ -344,15 +350,30 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         requested
     }
 
+    /// Limits the acceleration and converts it to the pulses of this tick. Their count defines the position: each tick
+    /// ends at the step nearest to the predicted position, so that what is rounded off is not lost.
+    #[inline(never)]
+    fn step(&mut self, steps: &StepMap<T>, requested: T) -> MotorCommand<T> {
+        let (tick_s, speed) = (self.table.tick_s, self.speed());
+        self.applied = steps.limited(requested, speed, tick_s);
+        let mean = speed + T::from_f32(0.5) * self.applied * tick_s;
+        // A state that is not a number moves nothing; the supervisor turns the motor off.
+        let target = steps.nearest(self.position() + mean * tick_s).unwrap_or(self.emitted);
+        let pulses = target.wrapping_sub(core::mem::replace(&mut self.emitted, target));
+        MotorCommand { requested_n: requested, applied_n: self.applied, drive: Drive::Steps(pulses) }
+    }
+
     /// Limits the force and converts it for the power stage.
     #[inline]
     fn actuate(&mut self, requested: T) -> MotorCommand<T> {
+        if let Some(steps) = &self.table.steps {
+            return self.step(steps, requested);
+        }
         let limited = saturate(requested, self.table.force_limit_n);
         let (applied, drive) = match &self.table.motor {
             None => (limited, Drive::Force(limited.to_f32())),
             Some(motor) => {
-                // The cart's speed is the state after its position.
-                let speed = self.estimate.get(1).copied().unwrap_or_default();
+                let speed = self.speed();
                 let (volts, force) = motor.volts_and_force(limited, speed, self.last_volts);
                 self.last_volts = volts;
                 (force, Drive::Duty(motor.duty(volts).to_f32()))
@@ -408,6 +429,17 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// [`predict`](Self::predict).
     fn acting(&self) -> T {
         if self.active.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
+    }
+
+    /// The cart's position (m).
+    fn position(&self) -> T {
+        self.estimate.get(0).copied().unwrap_or_default()
+    }
+
+    /// The cart's speed (m/s), the state after its position.
+    #[inline(always)]
+    fn speed(&self) -> T {
+        self.estimate.get(1).copied().unwrap_or_default()
     }
 
     fn output(&self) -> T {

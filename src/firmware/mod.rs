@@ -116,7 +116,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// The firmware, motor off. `start` is what the board knows about its start: a [`Start`], or just a
     /// [`Reset`](crate::protocol::message::Reset). Without swing-up, `swing_up` is [`NoSwingUp`].
     ///
-    /// There is a firmware for every table: if one is damaged, [`Fault::Table`] is latched, cannot be cleared, and is
+    /// There is a firmware for every table: if one is damaged, or its drive imposes the cart's acceleration, [`Fault::Table`] is latched, cannot be cleared, and is
     /// reported to the host. To know before, call [`GainTable::check`] and [`SwingUp::check`].
     // Returns no `Result`, which would put a copy of the firmware on the stack.
     #[inline(never)]
@@ -127,7 +127,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         start: impl Into<Start>,
     ) -> Self {
         let start = start.into();
-        let are_sound = swing_up.check(table).is_ok() && table.check().is_ok();
+        // Homing, sign checks and jog of the whole firmware are for forces only.
+        let is_served = table.steps.is_none();
+        let are_sound = is_served && swing_up.check(table).is_ok() && table.check().is_ok();
         let (controller, is_usable) = match Controller::with_checked(table, widths) {
             Ok(controller) if are_sound => (controller, true),
             _ => (Controller::unusable(table, widths), false),

@@ -3,7 +3,6 @@
 use heapless::Vec;
 
 use super::Firmware;
-use crate::control::actuator::Drive;
 use crate::control::motion::Playback;
 use crate::protocol::message::Telemetry;
 use crate::table::SwingUp;
@@ -29,7 +28,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     // Not inlined: most ticks do not need the registers and the stack that it takes.
     #[inline(never)]
     pub(super) fn telemetry(&self) -> Telemetry<NX, NY> {
-        let (Drive::Force(drive) | Drive::Duty(drive)) = self.output.drive;
         Telemetry {
             tick: self.tick,
             state: self.supervisor.state(),
@@ -50,7 +48,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             setpoint_m: self.controller.law_state().setpoint,
             requested_n: self.requested_n,
             applied_n: self.applied_n,
-            drive,
+            drive: self.output.drive.value(),
             cycles: self.cycles,
             worst_cycles: self.worst_cycles,
         }

@@ -8,7 +8,8 @@ use crate::plant::chain_state::ChainState;
 use crate::table::ChainModel;
 
 impl<const N: usize, T: Number> ChainModel<N, T> {
-    /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m).
+    /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m). Where the
+    /// drive imposes the cart's acceleration, that takes the place of the force (m/s²).
     ///
     /// The first equation gives `ẍ = (f + Σ_k a_k cos φ_k φ̈_k) / M_t` with `f = u - d_0 ẋ - Σ_k a_k sin φ_k φ̇_k²`.
     /// Substituted into the others, with `cos(φ_j - φ_k) = cos φ_j cos φ_k + sin φ_j sin φ_k` (and the sine likewise),
@@ -34,7 +35,7 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
         torques: &[T; N],
     ) -> ChainState<N, T> {
         let zero = force.constant(0.0);
-        let ([a], [weight]) = (&self.a.data.0, &self.weight.data.0);
+        let ([a], [weight], [reacting]) = (&self.a.data.0, &self.weight.data.0, &self.reaction.data.0);
         let (b, b_reduced) = (&self.b.data.0, &self.b_reduced.data.0);
         let (sin, cos) = T::sines_and_cosines(&state.phi);
 
@@ -47,7 +48,7 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
             sin_w2[k] = sin[k] * w2;
             cos_w2[k] = cos[k] * w2;
             ac[k] = a[k] * cos[k];
-            f -= a[k] * sin_w2[k];
+            f -= reacting[k] * sin_w2[k];
         }
         let f_over_mass = f * self.inverse_mass;
 
@@ -69,7 +70,7 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
         let phiddot = solve_symmetric(s, r, zero);
         let mut reaction = zero;
         for k in 0..N {
-            reaction += ac[k] * phiddot[k];
+            reaction += reacting[k] * cos[k] * phiddot[k];
         }
         ChainState {
             x: state.xdot,
@@ -148,6 +149,7 @@ mod tests {
         weight: vector![5.0],
         b: matrix![1.0 / 3.0],
         b_reduced: matrix![1.0 / 3.0 - 0.125],
+        reaction: vector![0.5],
         cart_friction: 0.0,
         joint_frictions: vector![0.0],
     };

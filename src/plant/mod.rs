@@ -16,6 +16,7 @@
 //!     weight: Vector1::new(5.0),
 //!     b: Matrix1::new(1.0 / 3.0),
 //!     b_reduced: Matrix1::new(1.0 / 3.0 - 0.125),
+//!     reaction: Vector1::new(0.5),
 //!     cart_friction: 0.0,
 //!     joint_frictions: Vector1::new(0.0),
 //! };

@@ -5,7 +5,9 @@ use nalgebra::{SMatrix, SVector};
 use crate::table::part::part;
 
 part! {
-    /// Constants of the equations of motion of `N` links on a cart; the equations are in [`plant`](crate::plant).
+    /// Constants of the equations of motion of `N` links on a cart; the equations are in [`plant`](crate::plant). Where
+    /// the drive imposes the cart's acceleration, that is the input instead of the force: M_t is 1, `reaction` and d_0
+    /// are 0, and `b_reduced` is `b`.
     pub struct ChainModel<N to M; T> {
         /// 1 / M_t, M_t the mass of cart and links together (1/kg).
         pub inverse_mass: T,
@@ -17,6 +19,9 @@ part! {
         pub b: SMatrix<T, N, N>,
         /// b_jk - a_j a_k / M_t, symmetric (kg m²).
         pub b_reduced: SMatrix<T, N, N>,
+        /// What the links' accelerations add to the cart's equation: a_j, or 0 where the drive imposes the cart's
+        /// acceleration (kg m).
+        pub reaction: SVector<T, N>,
         /// d_0, viscous friction of the cart (N s/m).
         pub cart_friction: T,
         /// d_i, viscous friction of each joint on its relative rate (N m s/rad).

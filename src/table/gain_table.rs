@@ -10,6 +10,7 @@ use crate::table::limits::Limits;
 use crate::table::motor::MotorMap;
 use crate::table::observer::ObserverGains;
 use crate::table::part::{is_finite, part};
+use crate::table::steps::StepMap;
 use crate::table::thresholds::Thresholds;
 
 part! {
@@ -41,6 +42,9 @@ part! {
         pub friction: Option<FrictionMap<NX, NY, T>>,
         /// The motor, if described: without it the controller gives a force.
         pub motor: Option<MotorMap<T>>,
+        /// The drive, if it imposes the cart's acceleration: then that is the input of the plant instead of the force,
+        /// and `force_limit_n` limits nothing.
+        pub steps: Option<StepMap<T>>,
         /// Limits that the supervisor enforces.
         pub limits: Limits<NY>,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault.
@@ -90,6 +94,8 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         let is_sound = self.force_limit_n > 0.0
             && self.laws.present().all(|(_, law)| law.is_sound())
             && self.motor.iter().all(MotorMap::is_sound)
+            && self.steps.iter().all(StepMap::is_sound)
+            && !(self.steps.is_some() && (self.motor.is_some() || self.delay_ticks == 1))
             && self.limits.is_sound()
             && self.thresholds.is_sound();
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }

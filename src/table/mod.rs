@@ -28,6 +28,7 @@ mod limits;
 mod motor;
 mod observer;
 mod part;
+mod steps;
 mod swing_up;
 mod thresholds;
 
@@ -47,6 +48,7 @@ pub use observer::ObserverGains;
 #[cfg(test)]
 pub(crate) use part::WordsMut;
 pub use part::{Part, Reader, Resize, Shape, Words};
+pub use steps::StepMap;
 pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
 pub use thresholds::{MotorTest, Thresholds};
 

@@ -103,7 +103,7 @@ fn a_rig_that_is_not_as_described_arrives_all_the_same() {
     let table = table(&with);
     let mut heavier = with.clone();
     let chain = heavier.chain_mut().unwrap();
-    chain.cart.mass_kg *= 1.3;
+    chain.cart.mass_kg = chain.cart.mass_kg.map(|mass| 1.3 * mass);
     chain.cart.friction_n_s_per_m *= 1.5;
     chain.links[0].mass_kg *= 0.8;
     let scenario = pulled(&with, Sensing::Encoders, 0.5);

@@ -81,6 +81,7 @@ fn table<const NX: usize, const NY: usize>(
             effect: SMatrix::from_fn(|_, _| number()),
         }),
         motor: None,
+        steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
         crc: 0,

@@ -1,7 +1,7 @@
 //! Tests of whole ticks of the controller.
 
 use super::*;
-use crate::table::{Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds, columns};
+use crate::table::{Limits, ObserverGains, PerLaw, StepMap, TABLE_FORMAT, Thresholds, columns};
 use nalgebra::{matrix, vector};
 
 /// A cart of 2 kg without friction, held for half a second.
@@ -27,6 +27,7 @@ fn table() -> GainTable<2, 1> {
         }),
         friction: None,
         motor: None,
+        steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
         crc: 0,
@@ -135,4 +136,78 @@ fn a_table_that_does_not_fit_is_refused() {
     assert_eq!(refused(&|t| t.force_limit_n = f32::NAN, true), Some(TableError::Value));
     assert_eq!(refused(&|t| t.laws.lqr = None, true), Some(TableError::NoLaw));
     assert_eq!(refused(&|t| t.force_limit_n = 6.0, false), Some(TableError::Crc));
+}
+
+/// A cart on a drive that takes pulses, with a law that follows the set-point fast.
+fn stepping() -> GainTable<2, 1> {
+    let tick_s = 0.001f32;
+    let law = LawGains {
+        k: columns([[400.0, 40.0]]),
+        k_pending: 0.0,
+        k_integral: 0.0,
+        n: 400.0,
+        setpoint_step: 10.0,
+    };
+    let observer = ObserverGains {
+        ad: matrix![1.0, tick_s; 0.0, 1.0],
+        bd: vector![0.5 * tick_s * tick_s, tick_s],
+        l: matrix![0.0; 0.0],
+        measured: [0],
+        step: vector![12.5e-6],
+    };
+    let steps = StepMap { step_m: 12.5e-6, acceleration_limit_m_per_s2: 60.0, speed_limit_m_per_s: 1.5 };
+    let mut table = GainTable {
+        tick_s,
+        delay_ticks: 0,
+        force_limit_n: f32::MAX,
+        laws: PerLaw { lqr: Some(law), pole_placement: None },
+        observer: Some(observer),
+        steps: Some(steps),
+        ..table()
+    };
+    table.crc = table.checksum();
+    table
+}
+
+/// Ten minutes of set-points that jump at random.
+#[test]
+fn every_pulse_is_counted_after_ten_minutes_at_100_khz() {
+    let table = stepping();
+    let step_m = f64::from(table.steps.unwrap().step_m);
+    let mut controller = Controller::new(&table, [CounterWidth::Bits32]).unwrap();
+    controller.start(&[0]).unwrap();
+    let (mut count, mut without_carry, mut most, mut random) = (0i32, 0i32, 0, 1u32);
+    for tick in 0..600_000 {
+        if tick % 400 == 0 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            controller.set_setpoint(0.3 * (random as i32 as f32 / i32::MAX as f32)).unwrap();
+        }
+        let command = controller.control(&[count as u32]);
+        let Drive::Steps(pulses) = command.drive else { panic!("{command:?}") };
+        let mean = controller.estimate()[1] + 0.5 * command.applied_n * table.tick_s;
+        without_carry += (f64::from(mean * table.tick_s) / step_m).round() as i32;
+        (count, most) = (count + pulses, most.max(pulses.abs()));
+        controller.predict();
+        let away = f64::from(count) - f64::from(controller.estimate()[0]) / step_m;
+        assert!(away.abs() <= 1.0, "tick {tick}: {away}");
+        assert!(controller.innovation()[0].abs() <= 13e-6);
+    }
+    assert!((100..=121).contains(&most), "{most} pulses in 1 ms");
+    // Negative control: each tick rounded by itself loses its way.
+    assert!((without_carry - count).abs() > 20, "{}", without_carry - count);
+}
+
+#[test]
+fn pulses_need_a_state_that_is_a_number_and_no_measured_cart() {
+    let table = stepping();
+    let mut controller = Controller::new(&table, [CounterWidth::Bits32]).unwrap();
+    controller.start_in_state(&vector![0.25, 0.0]);
+    controller.set_setpoint(0.25).unwrap();
+    assert_eq!(controller.control(&[20_000]).drive, Drive::Steps(0));
+    controller.start_in_state(&vector![f32::NAN, 0.0]);
+    assert_eq!(controller.control(&[20_000]).drive, Drive::Steps(0));
+    assert_eq!(controller.control_from_state(&vector![0.1, 0.0]).drive, Drive::OFF);
+    // A table with a motor, or with a delay, is none of such a drive.
+    let late = GainTable { delay_ticks: 1, ..table };
+    assert_eq!(GainTable { crc: late.checksum(), ..late }.check(), Err(TableError::Value));
 }

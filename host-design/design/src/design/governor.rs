@@ -4,7 +4,7 @@ use super::synthesis::{Design, Feedback};
 use crate::numerics::Matrix;
 use crate::rig::{Rig, defaults};
 
-/// Share of the angle and force limits that a motion of the set-point may use; the rest is left for disturbances.
+/// Share of the angle and force limits, or those of acceleration and speed, that a motion of the set-point may use; the rest is left for disturbances.
 const SHARE: f64 = 0.5;
 
 /// Largest change of the set-point per tick (m). In the linear model, every link and the force then stay within half
@@ -22,7 +22,7 @@ pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Op
     let (links, n) = (chain.links.len(), law.n?);
 
     let mut state = Matrix::zeros(matrix.rows(), 1);
-    let mut sums = vec![0.0; links + 1];
+    let mut sums = vec![0.0; links + 2];
     let most_ticks = (300.0 / rig.tick.period_s).clamp(1e4, 1e6) as usize;
     for tick in 0..most_ticks {
         let force = n - (&law.k * &state)[(0, 0)];
@@ -34,6 +34,7 @@ pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Op
             largest = largest.max(f64::abs(angle));
         }
         sums[links] += force.abs();
+        sums[links + 1] += state[(1, 0)].abs();
         let settled = largest < 1e-9 && (state[(0, 0)] - 1.0).abs() < 1e-6;
         if settled && tick > 10 {
             return bound(rig, &sums);
@@ -44,9 +45,13 @@ pub fn setpoint_step(rig: &Rig, design: &Design<f64>, law: &Feedback<f64>) -> Op
 }
 
 fn bound(rig: &Rig, sums: &[f64]) -> Option<f64> {
+    let (speed, sums) = sums.split_last()?;
     let (force, angles) = sums.split_last()?;
     let angle_limit = rig.limits.angle_rad.unwrap_or(defaults::ANGLE_RAD).min(defaults::ANGLE_RAD);
     let by_angle = angles.iter().map(|sum| SHARE * angle_limit / sum);
-    let by_force = rig.force_limit_n().map(|limit| SHARE * limit / force);
-    by_angle.chain(by_force).filter(|step| step.is_finite()).min_by(f64::total_cmp)
+    let by_force = rig.input_limit().map(|limit| SHARE * limit / force);
+    let drive = rig.actuator.acceleration.as_ref();
+    let most = drive.and_then(|drive| drive.largest_speed_m_per_s(rig.tick.period_s));
+    let by_speed = most.map(|limit| SHARE * limit / speed);
+    by_angle.chain(by_force).chain(by_speed).filter(|step| step.is_finite()).min_by(f64::total_cmp)
 }

@@ -7,7 +7,7 @@ use super::placed_observer::place_observer;
 use super::riccati::{Cost, dare};
 use super::zero_order_hold::integrated_quadratic;
 use crate::numerics::{Complex, Matrix, Real, solve, solve_right};
-use crate::rig::{self, Rig, Sensor};
+use crate::rig::{self, CartInput, Rig, Sensor};
 
 /// Steady-state gains of the observer.
 #[doc(alias = "lqe")]
@@ -26,8 +26,8 @@ pub struct Kalman<T> {
 }
 
 /// Gains of the observer and the relative residual of the equation that they solve. Process noise has the intensities
-/// in `noise`, enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a rounding error
-/// with the variance of [`rounding_variances`].
+/// in `noise`, enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a
+/// rounding error with the variance of [`rounding_variances`].
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
 /// `L = P Cᵀ (C P Cᵀ + R)⁻¹` (Anderson & Moore, *Optimal Filtering*, chapter 4). With `observer_poles`, L follows from
@@ -56,19 +56,35 @@ pub(super) fn kalman<R: Real>(
             a.cols(),
             |i, j| if sensors[i].state == j { R::one() } else { R::zero() },
         );
-    let r = Matrix::from_diagonal(&rounding_variances(rig, &steps));
+    let mut r = Matrix::from_diagonal(&rounding_variances(rig, &steps));
+    if rig.actuator.input() == CartInput::Acceleration {
+        add_rounded_motion(&mut r, inputs, &sensors);
+        return with_known_cart(ad, [&q, &c, &r], steps, period);
+    }
+    gains(ad, [&q, &c, &r], steps, &noise.observer_poles, period)
+}
+
+/// The gains of the plant with this Ad, process noise q, sensors c with the noise r.
+fn gains<R: Real>(
+    ad: &Matrix<R>,
+    [q, c, r]: [&Matrix<R>; 3],
+    steps: Vec<R>,
+    poles: &[[f64; 2]],
+    period: &R,
+) -> Result<(Kalman<R>, R), DesignError> {
     let unresolved = |_| DesignError::NoKalman { bits: R::bits() };
-    let (p, placed, residual) = if noise.observer_poles.is_empty() {
+    let (p, placed, residual) = if poles.is_empty() {
         let (a_t, c_t) = (ad.transpose(), c.transpose());
-        let solution = dare(&a_t, &c_t, &Cost::new(q, r.clone())).map_err(|_| why_no_kalman(&a_t, &c_t))?;
+        let cost = Cost::new(q.clone(), r.clone());
+        let solution = dare(&a_t, &c_t, &cost).map_err(|_| why_no_kalman(&a_t, &c_t))?;
         (solution.x, None, solution.residual)
     } else {
-        let (l, residual) = place_observer(ad, &c, &noise.observer_poles, period).map_err(unresolved)?;
-        let noise_of_a_tick = &q + &(&(&l * &r) * &l.transpose());
-        (stationary_covariance(ad - &(&l * &c), noise_of_a_tick), Some(l), residual)
+        let (l, residual) = place_observer(ad, c, poles, period).map_err(unresolved)?;
+        let noise_of_a_tick = q + &(&(&l * r) * &l.transpose());
+        (stationary_covariance(ad - &(&l * c), noise_of_a_tick), Some(l), residual)
     };
     let p_c = &p * &c.transpose();
-    let s = &(&c * &p_c) + &r;
+    let s = &(c * &p_c) + r;
     let l_filter = match &placed {
         None => solve_right(&p_c, &s),
         Some(l_predictor) => solve(ad, l_predictor),
@@ -92,6 +108,48 @@ fn stationary_covariance<R: Real>(mut f: Matrix<R>, w: Matrix<R>) -> Matrix<R> {
         f = &f * &f;
     }
     p
+}
+
+/// The drive moves the cart by whole steps, and the links swing with what is rounded: column `inputs` 0, the cart's
+/// acceleration, moves each angle by its entry times the cart's distance. `[q c r]` as in [`gains`].
+fn add_rounded_motion<R: Real>(r: &mut Matrix<R>, inputs: &Matrix<R>, sensors: &[Sensor]) {
+    let of_cart = r[(0, 0)].clone();
+    let per_metre = |sensor: usize| inputs[(sensors[sensor].state + 1, 0)].clone();
+    for i in 1..sensors.len() {
+        for j in 1..sensors.len() {
+            let rounded = per_metre(i) * &per_metre(j) * &of_cart;
+            r[(i, j)] = r[(i, j)].clone() + &rounded;
+        }
+    }
+}
+
+/// The gains where the drive knows position and speed of the cart: the first sensor, its own count, corrects nothing,
+/// and no sensor corrects the first two states.
+fn with_known_cart<R: Real>(
+    ad: &Matrix<R>,
+    [q, c, r]: [&Matrix<R>; 3],
+    steps: Vec<R>,
+    period: &R,
+) -> Result<(Kalman<R>, R), DesignError> {
+    let (states, sensors) = (ad.rows(), c.rows());
+    let (joints, encoders) = (states - 2, sensors - 1);
+    let links = [
+        &q.block(2, 2, joints, joints),
+        &c.block(1, 2, encoders, joints),
+        &r.block(1, 1, encoders, encoders),
+    ];
+    let (of_links, residual) =
+        gains(&ad.block(2, 2, joints, joints), links, steps[1..].to_vec(), &[], period)?;
+    let whole = |l: &Matrix<R>| Matrix::zeros(states, sensors).with_block(2, 1, l);
+    let l_filter = whole(&of_links.l_filter);
+    let of_cart = Matrix::column(&[r[(0, 0)].clone()]);
+    let known = Kalman {
+        l_predictor: ad * &l_filter,
+        l_filter,
+        steps: Matrix::column(&steps),
+        innovation_variances: of_cart.above(&of_links.innovation_variances),
+    };
+    Ok((known, residual))
 }
 
 /// Shortest tick (s) for which the rounding errors of successive counts of a chain's encoder are taken as independent.

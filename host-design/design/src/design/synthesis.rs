@@ -5,7 +5,7 @@ use super::error::{DesignError, Task};
 use super::kalman::{Kalman, kalman};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
-use super::zero_order_hold::{sampled_cost, zero_order_hold};
+use super::zero_order_hold::{mean_speed_cost, mean_speed_hold, sampled_cost, zero_order_hold};
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
 use crate::plant::{ChainParameters, LinearModel, linearise};
 use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
@@ -23,7 +23,7 @@ pub struct Design<T> {
     pub b: Matrix<T>,
     /// Ad of `x⁺ = Ad x + Bd u` for a force held over one tick, s×s.
     pub ad: Matrix<T>,
-    /// Bd, s×1.
+    /// Bd, s×1; of the mean speed during the tick if the drive imposes the cart's acceleration.
     pub bd: Matrix<T>,
     /// Gains for continuous time.
     pub continuous: Laws<T>,
@@ -107,7 +107,9 @@ impl<R: Real> Design<R> {
     ) -> Result<Self, DesignError> {
         let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
-        let (ad, bd) = zero_order_hold(&a, &b, &period);
+        let (ad, held) = zero_order_hold(&a, &b, &period);
+        let is_force = rig.actuator.input().is_force();
+        let bd = if is_force { held } else { mean_speed_hold(&ad, &b, &period) };
         let output = rig.output();
         let late = rig.tick.delay_ticks == 1;
 
@@ -115,7 +117,8 @@ impl<R: Real> Design<R> {
         if let Some(weights) = &rig.lqr {
             let cost = match lqr_cost(weights) {
                 of_a_tick if weights.cost_is_sum => of_a_tick,
-                over_time => sampled_cost(&a, &b, &over_time, &period),
+                over_time if is_force => sampled_cost(&a, &b, &over_time, &period),
+                over_time => mean_speed_cost(&a, &b, &over_time, &period),
             };
             let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));

@@ -13,12 +13,12 @@
 //!
 //! 1. Wiring: a few seconds are fitted with the wiring of the file, and with motor or encoders reversed, exchanged, or
 //!    with other counts. If another wiring fits better, it is named, and nothing else is done.
-//! 2. Multiple shooting: in windows of 0.25 s, each with its own initial state, parameters and initial states are fitted
-//!    by the Levenberg–Marquardt method. The dry friction of the cart is a bristle (Dahl's model), so that the cart
-//!    sticks for a moment when it reverses; that of the joints is `c tanh(ω/ε)`.
-//! 3. Prediction error: an extended Kalman filter predicts each measurement from the earlier ones. Its noise intensities
-//!    and the smoothing of the friction are chosen by maximum likelihood; the parameters minimise the squared
-//!    innovations divided by their variances (Gauss–Newton).
+//! 2. Multiple shooting: in windows of 0.25 s, each with its own initial state, parameters and initial states are
+//!    fitted by the Levenberg–Marquardt method. The dry friction of the cart is a bristle (Dahl's model), so that the
+//!    cart sticks for a moment when it reverses; that of the joints is `c tanh(ω/ε)`.
+//! 3. Prediction error: an extended Kalman filter predicts each measurement from the earlier ones. Its noise
+//!    intensities and the smoothing of the friction are chosen by maximum likelihood; the parameters minimise the
+//!    squared innovations divided by their variances (Gauss–Newton).
 //! 4. Deviations: from the normal equations, widened by a share of the change that other models of the dry friction and
 //!    finer sampling cause.
 //! 5. Verdict: the last 10 s (of a short log, a quarter) are held out of the fit, and predicted in windows of 0.5 s.

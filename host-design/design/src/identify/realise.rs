@@ -139,7 +139,7 @@ mod tests {
             }
             let found = realise(&chain, &p, None).unwrap();
             let mut other = chain.clone();
-            other.cart.mass_kg = found.cart_kg;
+            other.cart.mass_kg = Some(found.cart_kg);
             for (link, found) in other.links.iter_mut().zip(&found.links) {
                 (link.mass_kg, link.length_m) = (found.mass_kg, found.length_m);
                 (link.centre_of_mass_m, link.inertia_kg_m2) =

@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector};
 use upright::table::{ChainModel, Number};
 
 use super::{ChainParameters, PlantError};
-use crate::rig;
+use crate::rig::{self, CartInput};
 
 /// State of the chain in absolute angles, in `f64`.
 pub type WideChainState<const N: usize> = upright::plant::ChainState<N, f64>;
@@ -46,18 +46,21 @@ impl<const N: usize> ChainPlant<N> {
         if a.len() != N {
             return Err(PlantError::WrongLinks { links: a.len(), compiled: N });
         }
-        Ok(Self {
-            total_mass: mt,
-            model: ChainModel {
-                inverse_mass: 1.0 / mt,
-                a: SVector::from_fn(|j, _| a[j]),
-                weight: SVector::from_fn(|j, _| parameters.gravity * a[j]),
-                b: SMatrix::from_fn(|j, k| b[(j, k)]),
-                b_reduced: SMatrix::from_fn(|j, k| b[(j, k)] - a[j] * a[k] / mt),
-                cart_friction: parameters.cart_friction,
-                joint_frictions: SVector::from_fn(|j, _| parameters.joint_frictions[j]),
-            },
-        })
+        let mut model = ChainModel {
+            inverse_mass: 1.0 / mt,
+            a: SVector::from_fn(|j, _| a[j]),
+            weight: SVector::from_fn(|j, _| parameters.gravity * a[j]),
+            b: SMatrix::from_fn(|j, k| b[(j, k)]),
+            b_reduced: SMatrix::from_fn(|j, k| b[(j, k)] - a[j] * a[k] / mt),
+            reaction: SVector::from_fn(|j, _| a[j]),
+            cart_friction: parameters.cart_friction,
+            joint_frictions: SVector::from_fn(|j, _| parameters.joint_frictions[j]),
+        };
+        if parameters.input == CartInput::Acceleration {
+            (model.inverse_mass, model.cart_friction) = (1.0, 0.0);
+            (model.b_reduced, model.reaction) = (model.b, SVector::zeros());
+        }
+        Ok(Self { total_mass: mt, model })
     }
 
     /// The plant of a rig file's chain.
@@ -73,11 +76,26 @@ impl<const N: usize> ChainPlant<N> {
         &self.model
     }
 
-    /// Rate of change of `state` under a force on the cart (N, along +x) and torques at the joints (N·m): see
+    /// Rate of change of `state` under the cart's input (N or m/s², along +x) and torques at the joints (N·m): see
     /// [`ChainModel::derivative`].
     #[inline]
     pub fn derivative(&self, state: &WideChainState<N>, force: f64, torques: &[f64; N]) -> WideChainState<N> {
         self.model.derivative(state, force, torques)
+    }
+
+    /// `state` after the cart's speed has jumped to `speed` (m/s): the links' rates change by as much as under the same
+    /// change of speed in a short time.
+    pub fn with_cart_speed(&self, state: &WideChainState<N>, speed: f64) -> WideChainState<N> {
+        // Both rates are linear in the input, so that their ratio is that of the jumps.
+        let without = self.derivative(state, 0.0, &[0.0; N]);
+        let with = self.derivative(state, 1.0, &[0.0; N]);
+        let impulse = (speed - state.xdot) / (with.xdot - without.xdot);
+        let mut after = *state;
+        after.xdot = speed;
+        for j in 0..N {
+            after.phidot[j] += impulse * (with.phidot[j] - without.phidot[j]);
+        }
+        after
     }
 
     /// Mechanical energy in `state`: T and V of [`ChainParameters`].

@@ -16,7 +16,7 @@ pub struct Partials<const N: usize> {
     pub phi: [f64; N],
     /// With respect to each φ̇.
     pub phidot: [f64; N],
-    /// With respect to the force on the cart.
+    /// With respect to the cart's input: force or acceleration.
     pub force: f64,
     /// With respect to the torque at each joint.
     pub torques: [f64; N],
@@ -68,8 +68,9 @@ impl<const N: usize> ChainPlant<N> {
         let mut mass = [[0.0; N]; N];
         for j in 0..N {
             let (a, w2) = (model.a[j], w[j] * w[j]);
-            cart.phi[j] = -a * (sin[j] * wdot[j] + cos[j] * w2);
-            cart.phidot[j] = -2.0 * a * sin[j] * w[j];
+            let reacting = model.reaction[j];
+            cart.phi[j] = -reacting * (sin[j] * wdot[j] + cos[j] * w2);
+            cart.phidot[j] = -2.0 * reacting * sin[j] * w[j];
             links[j].phi[j] += model.weight[j] * cos[j] - a * sin[j] * rate.xdot;
             for k in 0..N {
                 let (b, w2) = (model.b[(j, k)], w[k] * w[k]);
@@ -97,12 +98,12 @@ impl<const N: usize> ChainPlant<N> {
             let share = model.a[j] * cos[j] * model.inverse_mass;
             links[j].add(share, &cart);
             for k in 0..N {
-                s[j][k] -= share * model.a[k] * cos[k];
+                s[j][k] -= share * model.reaction[k] * cos[k];
             }
         }
         solve(s, &mut links);
         for k in 0..N {
-            cart.add(model.a[k] * cos[k], &links[k]);
+            cart.add(model.reaction[k] * cos[k], &links[k]);
         }
         cart.scale(model.inverse_mass);
         (cart, links)

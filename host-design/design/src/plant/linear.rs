@@ -4,6 +4,7 @@ use upright::table::Equilibrium;
 
 use super::ChainParameters;
 use crate::numerics::{Matrix, Real, Singular, solve};
+use crate::rig::CartInput;
 
 /// Linear model `ẋ = A x + B u + G τ` in deviations from an equilibrium. A chain has s = 2n + 2 states, in the order
 /// that the module `plant` defines.
@@ -11,7 +12,7 @@ use crate::numerics::{Matrix, Real, Singular, solve};
 pub struct LinearModel<R> {
     /// `A`, s×s.
     pub a: Matrix<R>,
-    /// `B`, s×1: the force on the cart (N).
+    /// `B`, s×1: the force on the cart (N), or its acceleration (m/s²) where the drive imposes that.
     pub b: Matrix<R>,
     /// `G`, s×n: the torques at the joints (N·m).
     pub torque_inputs: Matrix<R>,
@@ -27,6 +28,8 @@ pub struct LinearModel<R> {
 /// φ_j = θ_1 + … + θ_j,   θ̈_i = φ̈_i - φ̈_{i-1}
 /// ```
 ///
+/// Where the drive imposes the cart's acceleration u, the first row is `ẍ = u`.
+///
 /// # Errors
 /// [`Singular`] if the mass matrix has no inverse: some motion of the chain moves no mass.
 #[doc(alias = "linearize")]
@@ -40,7 +43,9 @@ pub fn linearise<R: Real>(
     // Columns: forces and torques on x, φ caused by each of θ_1 … θ_n, ẋ, θ̇_1 … θ̇_n, u, τ_1 … τ_n.
     let (rates, inputs) = (n, 2 * n + 1);
     let mut causes = Matrix::zeros(n + 1, 3 * n + 2);
-    causes[(0, rates)] = -parameters.cart_friction.clone();
+    if parameters.input == CartInput::Force {
+        causes[(0, rates)] = -parameters.cart_friction.clone();
+    }
     causes[(0, inputs)] = R::one();
     for j in 1..=n {
         let gravity_torque = sigma[j - 1].clone() * &parameters.gravity * &parameters.a[j - 1];

@@ -1,7 +1,7 @@
 //! The constants of a chain's equations of motion.
 
 use crate::numerics::{Matrix, Real};
-use crate::rig;
+use crate::rig::{self, CartInput};
 
 /// The constants of the equations of motion in `x, φ` for n links.
 ///
@@ -20,9 +20,13 @@ use crate::rig;
 /// -a_j cos φ_j ẍ + Σ_k b_jk (cos(φ_j - φ_k) φ̈_k + sin(φ_j - φ_k) φ̇_k²) - g a_j sin φ_j = Q_j
 /// Q_j = τ_j - τ_{j+1},   τ_i = (torque given at joint i) - d_i θ̇_i,   τ_{n+1} = 0
 /// ```
+///
+/// Where the drive imposes the cart's acceleration a, `ẍ = a` takes the place of the first equation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainParameters<R> {
-    /// `M_t`: mass of cart and links together (kg).
+    /// What the drive imposes on the cart.
+    pub input: CartInput,
+    /// `M_t`: mass of cart and links together (kg); without the cart, if its mass is not known.
     pub total_mass: R,
     /// `a_j`, n entries (kg·m).
     pub a: Vec<R>,
@@ -55,8 +59,10 @@ impl<R: Real> ChainParameters<R> {
             Some(given) => R::from_f64(given),
             None => mass[j].clone() * &length[j] * &length[j] / &R::from_f64(12.0),
         };
+        let cart_kg = chain.cart.mass_kg.unwrap_or_default();
         Self {
-            total_mass: mass.iter().fold(R::from_f64(chain.cart.mass_kg), |sum, m| sum + m),
+            input: chain.input,
+            total_mass: mass.iter().fold(R::from_f64(cart_kg), |sum, m| sum + m),
             a: (0..n).map(|j| (j..n).fold(R::zero(), |sum, i| sum + &(h(i, j) * &mass[i]))).collect(),
             b: Matrix::from_fn(n, n, |j, k| {
                 let of_rotation = if j == k { inertia(j) } else { R::zero() };
@@ -84,11 +90,16 @@ impl<R: Real> ChainParameters<R> {
     /// [ -a_j cos φ_j    b_jk cos(φ_j - φ_k)    ]
     /// ```
     ///
+    /// Its first row is 1, 0, … if the drive imposes the cart's acceleration.
+    ///
     /// # Panics
     /// If `phi` has fewer than n entries.
     pub fn mass_matrix(&self, phi: &[R]) -> Matrix<R> {
         let coupling = |j: usize| -(phi[j].cos() * &self.a[j]);
+        let is_imposed = self.input == CartInput::Acceleration;
         Matrix::from_fn(self.links() + 1, self.links() + 1, |row, column| match (row, column) {
+            (0, 0) if is_imposed => R::one(),
+            (0, _) if is_imposed => R::zero(),
             (0, 0) => self.total_mass.clone(),
             (0, j) | (j, 0) => coupling(j - 1),
             (j, k) => (phi[j - 1].clone() - &phi[k - 1]).cos() * &self.b[(j - 1, k - 1)],

@@ -24,12 +24,18 @@ pub trait Plant: Send {
     fn set_state(&mut self, state: &[f64]);
 
     /// Writes the rate of change of `state` under `force` (N) and `disturbances` (joint torques in N·m) into `rate`.
+    /// Where the drive imposes the cart's acceleration, that takes the place of the force (m/s²), also in
+    /// [`advance`](Self::advance).
     /// Neither uses nor changes the plant's own state.
     fn rate(&self, state: &[f64], force: f64, disturbances: &[f64], rate: &mut [f64]);
 
     /// Advances the plant by `dt` (s) in `substeps` equal steps (0 counts as 1) with `force` (N) and `disturbances`
     /// (joint torques in N·m) held constant.
     fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize);
+
+    /// Makes the cart's speed jump (m/s), and the links' rates with it: as by an impulse on the cart. A linear model has
+    /// no cart, and stays as it is.
+    fn set_cart_speed(&mut self, _speed: f64) {}
 
     /// Mechanical energy (J); none for a linear model.
     fn energy(&self) -> Option<Energy>;
@@ -99,6 +105,10 @@ impl<const N: usize> Plant for ChainSimulation<N> {
         for _ in 0..substeps {
             self.state = self.plant.rk4(&self.state, force, &torques, step);
         }
+    }
+
+    fn set_cart_speed(&mut self, speed: f64) {
+        self.state = self.plant.with_cart_speed(&self.state, speed);
     }
 
     fn energy(&self) -> Option<Energy> {

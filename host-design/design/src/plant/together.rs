@@ -66,6 +66,7 @@ struct Chains<const N: usize> {
     weight: [LaneRow; N],
     b: [[LaneRow; N]; N],
     b_reduced: [[LaneRow; N]; N],
+    reaction: [LaneRow; N],
     cart_friction: LaneRow,
     joint_frictions: [LaneRow; N],
     state: ChainState<N, LaneRow>,
@@ -85,6 +86,7 @@ impl<const N: usize> Together<N> {
                 weight: [row; N],
                 b: [[row; N]; N],
                 b_reduced: [[row; N]; N],
+                reaction: [row; N],
                 cart_friction: row,
                 joint_frictions: [row; N],
                 state: ChainState { x: row, xdot: row, phi: [row; N], phidot: [row; N] },
@@ -110,6 +112,7 @@ impl<const N: usize> Chains<N> {
         for j in 0..N {
             self.a[j][lane] = model.a[j];
             self.weight[j][lane] = model.weight[j];
+            self.reaction[j][lane] = model.reaction[j];
             self.joint_frictions[j][lane] = model.joint_frictions[j];
             for k in 0..N {
                 // By columns, as the matrix is stored.
@@ -205,6 +208,7 @@ impl<const N: usize> Chains<N> {
             weight: SVector::from_array_storage(ArrayStorage([[zero; N]])),
             b: SMatrix::from_array_storage(ArrayStorage([[zero; N]; N])),
             b_reduced: SMatrix::from_array_storage(ArrayStorage([[zero; N]; N])),
+            reaction: SVector::from_array_storage(ArrayStorage([[zero; N]])),
             cart_friction: Lanes::load(simd, &self.cart_friction, first),
             joint_frictions: SVector::from_array_storage(ArrayStorage([[zero; N]])),
         };
@@ -213,6 +217,7 @@ impl<const N: usize> Chains<N> {
         for j in 0..N {
             model.a.data.0[0][j] = Lanes::load(simd, &self.a[j], first);
             model.weight.data.0[0][j] = Lanes::load(simd, &self.weight[j], first);
+            model.reaction.data.0[0][j] = Lanes::load(simd, &self.reaction[j], first);
             model.joint_frictions.data.0[0][j] = Lanes::load(simd, &self.joint_frictions[j], first);
             for k in 0..N {
                 model.b.data.0[j][k] = Lanes::load(simd, &self.b[j][k], first);

@@ -51,12 +51,14 @@ impl Driver {
         let command = match drive {
             Drive::Force(force) => f64::from(force),
             Drive::Duty(duty) => f64::from(duty).clamp(-1.0, 1.0),
+            // `[reality]` of such a rig has no driver.
+            Drive::Steps(_) => 0.0,
         };
         let mean = self.follow(command, dt);
         let force = match (drive, motor) {
             (Drive::Force(_), _) => mean,
             (Drive::Duty(_), Some(motor)) => self.motor_force(motor, mean, speed),
-            (Drive::Duty(_), None) => 0.0,
+            (Drive::Duty(_), None) | (Drive::Steps(_), _) => 0.0,
         };
         self.force_factor * force
     }

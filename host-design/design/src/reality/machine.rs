@@ -13,7 +13,7 @@ use crate::plant::{
     ChainParameters, ChainPlant, Energy, Plant, PlantError, WideChainState, WithLinks, chain_plant,
     with_links,
 };
-use crate::rig::{Chain, Rig};
+use crate::rig::{CartInput, Chain, Rig};
 
 /// Largest phase (rad) by which the fastest stuck contact may advance in a step. A Runge–Kutta step then has an error
 /// of about 1e-5 of the contact's swing; half of this phase changes the runs less than another seed does.
@@ -72,16 +72,17 @@ impl<const N: usize> RealChain<N> {
         let angle = rig.reality.sensors.rail_tilt_rad;
         let gravity = real.gravity_m_per_s2;
         real.gravity_m_per_s2 *= libm::cos(angle);
-        let belt = Belt::of(rig, real.cart.mass_kg);
-        if let Some(belt) = &belt {
-            real.cart.mass_kg -= belt.rotor_kg;
+        let belt = real.cart.mass_kg.and_then(|cart_kg| Belt::of(rig, cart_kg));
+        if let (Some(belt), Some(cart_kg)) = (&belt, &mut real.cart.mass_kg) {
+            *cart_kg -= belt.rotor_kg;
         }
         let parameters = ChainParameters::<f64>::of(&real);
         let along = gravity * libm::sin(angle);
         let total_kg = parameters.total_mass + belt.as_ref().map_or(0.0, |belt| belt.rotor_kg);
         let slope = Slope {
             angle,
-            cart_n: along * total_kg,
+            // A drive that imposes the acceleration carries the weight, too.
+            cart_n: if real.input == CartInput::Force { along * total_kg } else { 0.0 },
             links_n_m: core::array::from_fn(|j| along * parameters.a[j]),
         };
         let mobility = mobility(&parameters);
@@ -306,6 +307,10 @@ impl<const N: usize> Plant for RealChain<N> {
             potential -= self.slope.links_n_m.iter().zip(&sin).map(|(torque, sin)| torque * sin).sum::<f64>();
         }
         Some(Energy { kinetic, potential })
+    }
+
+    fn set_cart_speed(&mut self, speed: f64) {
+        self.motion.chain = self.plant.with_cart_speed(&self.motion.chain, speed);
     }
 
     fn motor_speed(&self) -> Option<f64> {

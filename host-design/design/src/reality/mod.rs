@@ -4,6 +4,7 @@
 //! - [`Belt`]: backlash and an elastic belt.
 //! - [`real_plant`]: the chain with both and with air drag, on a tilted rail, with its real masses and lengths.
 //! - [`Driver`]: motor driver and supply.
+//! - [`StepMotor`]: the spring between field and rotor of a step motor.
 //! - [`Timing`]: when the force of a tick begins and ends.
 //! - [`RealEncoders`]: errors of encoders and of their zeros.
 //!
@@ -16,6 +17,7 @@ mod driver;
 mod encoders;
 mod machine;
 mod parameters;
+mod step_motor;
 mod timing;
 
 pub use belt::{Belt, Rotor};
@@ -24,4 +26,5 @@ pub use driver::Driver;
 pub use encoders::{RealEncoders, hanging_by_hand};
 pub use machine::{RealChain, ideal_chain, real_plant};
 pub use parameters::real_chain;
+pub use step_motor::StepMotor;
 pub use timing::Timing;

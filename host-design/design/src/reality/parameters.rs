@@ -18,7 +18,7 @@ pub fn real_chain(chain: &Chain, errors: &ParameterErrors) -> Chain {
         (1.0 + percent / 100.0) * (1.0 + drawn)
     };
     let mut real = chain.clone();
-    real.cart.mass_kg *= factor(errors.cart_mass_percent);
+    real.cart.mass_kg = real.cart.mass_kg.map(|mass| mass * factor(errors.cart_mass_percent));
     for (index, link) in real.links.iter_mut().enumerate() {
         let mass = factor(errors.link_mass_percent.of(index));
         let length = factor(errors.link_length_percent.of(index));

@@ -31,7 +31,8 @@ impl Rig {
     /// The rig's values as plain text, narrower than 80 columns. Values that equal their default or were left out are
     /// marked `(default)`.
     pub fn describe(&self) -> String {
-        let mut page = Description::default();
+        let is_acceleration = self.actuator.acceleration.is_some();
+        let mut page = Description { is_acceleration, ..Description::default() };
         page.heading(&self.name);
         page.note("hash", &format!("{:016x}", self.hash()));
         match &self.plant {
@@ -80,6 +81,8 @@ fn digits(x: f64) -> String {
 #[derive(Default)]
 struct Description {
     text: String,
+    /// Whether the drive imposes the cart's acceleration.
+    is_acceleration: bool,
 }
 
 impl Description {
@@ -173,10 +176,13 @@ impl Description {
     fn chain(&mut self, chain: &Chain) {
         let n = chain.links.len();
         let length: f64 = chain.links.iter().map(|link| link.length_m).sum();
-        let mass: f64 = chain.cart.mass_kg + chain.links.iter().map(|link| link.mass_kg).sum::<f64>();
+        let links_kg = chain.links.iter().map(|link| link.mass_kg).sum::<f64>();
         self.value("links on a cart", n as f64, "", "");
         self.value("states", (2 * n + 2) as f64, "", "");
-        self.value("total mass", mass, "kg", "");
+        match chain.cart.mass_kg {
+            Some(cart_kg) => self.value("total mass", cart_kg + links_kg, "kg", ""),
+            None => self.value("mass of the links", links_kg, "kg", ""),
+        }
         self.value("total length", length, "m", "");
         self.row(&GRAVITY, GRAVITY.key("m_per_s2"), &[chain.gravity_m_per_s2]);
         self.section(&CART, &chain.cart);
@@ -230,6 +236,11 @@ impl Description {
 
     fn actuator(&mut self, actuator: &Actuator) {
         self.heading("actuator");
+        if let Some(drive) = &actuator.acceleration {
+            self.note("kind", "acceleration");
+            self.rows(&ACTUATOR, drive);
+            return;
+        }
         let limit = ACTUATOR.key("force_limit_n");
         self.row(&ACTUATOR, limit, actuator.force_limit_n.as_slice());
         match &actuator.motor {
@@ -253,6 +264,7 @@ impl Description {
         self.rows(&REALITY, &reality.air_drag);
         self.rows(&REALITY, &reality.drive_train);
         self.rows(&REALITY, &reality.driver);
+        self.rows(&REALITY, &reality.step_motor);
         self.rows(&REALITY, &reality.sensors);
         self.rows(&REALITY, &reality.parameters);
     }
@@ -266,7 +278,8 @@ impl Description {
         if !lqr.cross_weights.is_empty() {
             self.numbers("cross weights", &lqr.cross_weights, "");
         }
-        self.value("force weight", lqr.force_weight, "", "");
+        let weight = if self.is_acceleration { "acceleration weight" } else { "force weight" };
+        self.value(weight, lqr.force_weight, "", "");
         if lqr.angles_are_absolute {
             self.line("angles", "absolute", "", "");
         }
@@ -294,7 +307,11 @@ impl Description {
         }
         if let Some(KalmanNoise { force_noise_n2_s, joint_noise, observer_poles }) = &rig.kalman {
             self.heading("kalman");
-            self.value("force noise intensity", *force_noise_n2_s, "N²·s", "");
+            let (name, unit) = match self.is_acceleration {
+                false => ("force noise intensity", "N²·s"),
+                true => ("acceleration noise intensity", "m²/s³"),
+            };
+            self.value(name, *force_noise_n2_s, unit, "");
             self.numbers("joint noise intensities", joint_noise, "(N·m)²·s");
             if !observer_poles.is_empty() {
                 self.list("observer poles", observer_poles.iter().map(pole), "1/s");

@@ -97,13 +97,19 @@ impl Rig {
     }
 
     /// Largest force on the cart (N): the smaller of the file's limit and the motor's stall force, where given.
-    /// None: no limit.
+    /// None: no limit, or a drive that imposes the acceleration, whatever force that takes.
     pub fn force_limit_n(&self) -> Option<f64> {
         let stall = self.actuator.motor.as_ref().map(Motor::stall_force_n);
         match (self.actuator.force_limit_n, stall) {
             (Some(limit), Some(stall)) => Some(limit.min(stall)),
             (limit, stall) => limit.or(stall),
         }
+    }
+
+    /// Largest input of the plant: force on the cart (N), or its acceleration (m/s²). None: no limit.
+    pub fn input_limit(&self) -> Option<f64> {
+        let drive = self.actuator.acceleration.as_ref();
+        drive.map(|drive| drive.acceleration_limit_m_per_s2).or_else(|| self.force_limit_n())
     }
 
     /// Index of the state that follows the set-point: the cart position, or the model's output.

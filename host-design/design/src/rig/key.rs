@@ -63,6 +63,7 @@ pub fn unit_in_names(unit: &str) -> String {
         ("·", "_"),
         ("/", "_per_"),
         ("²", "2"),
+        ("³", "3"),
         ("Ω", "ohm"),
         ("%", "percent"),
         ("°", "deg"),

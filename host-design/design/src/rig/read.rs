@@ -3,6 +3,7 @@
 use super::error::RigError;
 use super::key::Section;
 use super::node::{Node, RigSource, Table};
+use super::sections::chain::CartInput;
 use super::sections::{
     SECTIONS, TOP, actuator, chain, friction, integral, kalman, limits, lqr, model, pole_placement, reality,
     robust, swing_up, tick, verify,
@@ -15,12 +16,13 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let document = source.document()?;
     let root = Table::root(source, &document, &TOP, &SECTIONS.map(|section| section.name))?;
     let name = name(&root)?;
-    let plant = chain::plant(&root)?;
-    let states = plant.states();
     let given = |section: &Section| root.get(section.name);
-    let actuator =
-        given(&actuator::ACTUATOR).map_or(Ok(Actuator::default()), |node| actuator::actuator(&node))?;
     let tick = scalars(&root, &tick::TICK)?.unwrap_or_else(Tick::default);
+    let actuator = given(&actuator::ACTUATOR)
+        .map_or(Ok(Actuator::default()), |node| actuator::actuator(&node, &tick))?;
+    let input = actuator.input();
+    let plant = chain::plant(&root, input)?;
+    let states = plant.states();
     let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor.is_some());
     let rig = Rig {
         name,
@@ -29,17 +31,18 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
             .map(|node| robust::robust(&node, &plant, tick.period_s))
             .transpose()?,
         lqr: given(&lqr::LQR)
-            .map(|node| lqr::lqr(&node, states, matches!(plant, PlantDescription::Chain(_))))
+            .map(|node| lqr::lqr(&node, states, matches!(plant, PlantDescription::Chain(_)), input))
             .transpose()?,
         pole_placement: given(&pole_placement::POLE_PLACEMENT)
             .map(|node| pole_placement::pole_placement(&node, states))
             .transpose()?,
-        kalman: given(&kalman::KALMAN).map(|node| kalman::kalman(&node, &plant)).transpose()?,
+        kalman: given(&kalman::KALMAN).map(|node| kalman::kalman(&node, &plant, input)).transpose()?,
         integral: scalars::<Integral>(&root, &integral::INTEGRAL)?,
         friction: given(&friction::FRICTION)
             .map(|node| friction::friction(&node, &plant, given(&kalman::KALMAN).is_some()))
             .transpose()?,
-        limits: given(&limits::LIMITS).map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant))?,
+        limits: given(&limits::LIMITS)
+            .map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant, input))?,
         verify: scalars(&root, &verify::VERIFY)?.unwrap_or_else(Requirements::default),
         actuator,
         tick,
@@ -78,10 +81,14 @@ fn name(root: &Table<'_>) -> Result<String, RigError> {
 /// alone.
 fn position_is_measured(root: &Table<'_>, plant: &PlantDescription) -> Result<(), RigError> {
     match plant {
-        PlantDescription::Chain(chain) if chain.cart.encoder_step_m.is_none() => Err(root
-            .need("cart", "[cart]")?
-            .table(&chain::CART)?
-            .missing("encoder_step_m", "the travel per encoder count in m: [kalman] needs it")),
+        PlantDescription::Chain(chain)
+            if chain.input == CartInput::Force && chain.cart.encoder_step_m.is_none() =>
+        {
+            Err(root
+                .need("cart", "[cart]")?
+                .table(&chain::CART)?
+                .missing("encoder_step_m", "the travel per encoder count in m: [kalman] needs it"))
+        }
         PlantDescription::Model(model) if model.measured_steps.is_empty() => Err(root
             .need("model", "[model]")?
             .table(&model::MODEL)?

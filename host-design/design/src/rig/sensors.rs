@@ -36,9 +36,10 @@ impl Rig {
     pub fn sensors(&self) -> Vec<Sensor> {
         match &self.plant {
             PlantDescription::Chain(chain) => {
-                let cart = chain
-                    .cart
-                    .encoder_step_m
+                // A drive that imposes the motion counts its own steps.
+                let step_m = self.actuator.acceleration.as_ref().map(|drive| drive.step_m);
+                let cart = step_m
+                    .or(chain.cart.encoder_step_m)
                     .map(|step| Sensor { state: 0, resolution: Resolution::Step(step) });
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {
                     let resolution = match description.encoder? {

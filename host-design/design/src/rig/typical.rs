@@ -36,8 +36,13 @@ impl Tolerances {
 
 impl Rig {
     /// What fault detection tolerates: `[robust]`, but at least a typical machine. None for a model.
+    ///
+    /// A drive that imposes the cart's acceleration overcomes its friction.
     pub fn detection_tolerances(&self) -> Option<Tolerances> {
-        let typical = Tolerances::typical(self.chain()?);
+        let mut typical = Tolerances::typical(self.chain()?);
+        if self.actuator.acceleration.is_some() {
+            typical.cart_friction_n = 0.0;
+        }
         Some(self.robust.as_ref().map_or_else(|| typical.clone(), |stated| stated.at_least(&typical)))
     }
 }

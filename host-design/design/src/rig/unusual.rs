@@ -25,7 +25,9 @@ impl Rig {
             }
         };
         if let Some(chain) = self.chain() {
-            expect("cart.mass_kg", chain.cart.mass_kg, "kg", MASS_KG);
+            if let Some(mass_kg) = chain.cart.mass_kg {
+                expect("cart.mass_kg", mass_kg, "kg", MASS_KG);
+            }
             expect("length of cart.travel_m", chain.cart.travel_m[1] - chain.cart.travel_m[0], "m", TRAVEL_M);
             for (number, link) in (1..).zip(&chain.links) {
                 expect(&format!("link[{number}].mass_kg"), link.mass_kg, "kg", MASS_KG);

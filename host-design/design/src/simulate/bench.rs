@@ -9,13 +9,19 @@ use upright::control::encoder::CounterWidth;
 use super::error::SimulationError;
 use super::scenario::Scenario;
 use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
-use crate::reality::{Driver, RealEncoders, Timing, ideal_chain, real_plant};
+use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
 use crate::rig::{Chain, PlantDescription, Rig};
 
 /// The simulated rig: everything outside the controller.
 pub struct Bench {
     plant: Box<dyn Plant>,
     motor: Option<MotorPlant>,
+    /// Travel per pulse (m) of a drive that imposes the cart's motion.
+    step_m: Option<f64>,
+    /// Its pulses so far, from position 0.
+    pulses: i64,
+    /// Its motor, unless it goes where its pulses say.
+    step_motor: Option<StepMotor>,
     driver: Option<Driver>,
     timing: Timing,
     encoders: Option<RealEncoders>,
@@ -43,8 +49,12 @@ impl Bench {
     /// # Errors
     /// [`SimulationError`] if the plant cannot be built or a noise level is impossible.
     pub fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
+        let step_motor = StepMotor::of(rig);
         let mut plant: Box<dyn Plant> = match &rig.plant {
-            PlantDescription::Chain(chain) => real_plant(chain, rig)?,
+            PlantDescription::Chain(chain) => match &step_motor {
+                Some(motor) => real_plant(&motor.pulled(chain), rig)?,
+                None => real_plant(chain, rig)?,
+            },
             PlantDescription::Model(model) => Box::new(LinearSimulation::of(model)),
         };
         plant.set_state(&scenario.start);
@@ -53,11 +63,15 @@ impl Bench {
         };
         let finite =
             |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
+        let step_m = rig.actuator.acceleration.as_ref().map(|drive| drive.step_m);
         Ok(Self {
             torques: vec![0.0; plant.disturbances()],
             pull_n_m: vec![0.0; plant.disturbances()],
             plant,
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
+            step_m,
+            pulses: step_m.map_or(0, |step_m| nearest(scenario.start[0] / step_m)),
+            step_motor,
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
@@ -91,6 +105,7 @@ impl Bench {
     pub fn hold(&mut self, state: &[f64]) {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
+        self.pulses = self.step_m.map_or(0, |step_m| nearest(state[0] / step_m));
     }
 
     /// Widths of the hardware counters: 32 bits for the cart, 16 for the links.
@@ -110,6 +125,10 @@ impl Bench {
     /// Writes the readings of the hardware counters into `counters`; entries without a sensor keep their value.
     pub fn read_counters(&self, counters: &mut [u32]) {
         for index in 0..counters.len().min(self.sensors.len()) {
+            if index == 0 && self.step_m.is_some() {
+                counters[0] = Self::reading(0, self.counter_start.wrapping_add(self.pulses as u32));
+                continue;
+            }
             let (state, step) = self.sensors[index];
             let position = match &self.encoders {
                 Some(errors) => errors.measured(state, self.state[state]),
@@ -163,8 +182,12 @@ impl Bench {
     }
 
     /// Simulates one tick with the command `drive`, issued at its start; returns the motor's force on the cart at the
-    /// start of the tick (N), without the disturbance.
+    /// start of the tick (N), without the disturbance; 0 for a drive that imposes the cart's motion.
     pub fn tick(&mut self, drive: Drive) -> f64 {
+        if let Some(step_m) = self.step_m {
+            self.step(if let Drive::Steps(pulses) = drive { pulses } else { 0 }, step_m);
+            return 0.0;
+        }
         let (now, disturbance) = self.begin(drive);
         let before = std::mem::replace(&mut self.acting_drive, now);
         let [latency, rest] = self.timing.next_tick();
@@ -172,6 +195,31 @@ impl Bench {
             self.advance(before, disturbance, latency);
         }
         self.advance(now, disturbance, rest)
+    }
+
+    /// Simulates one tick of a drive that imposes the cart's motion by `pulses`, spread evenly. Without a motor they are a
+    /// constant speed, and forces on the cart change nothing. Without pulses, as when the drive is off, the cart
+    /// stands.
+    fn step(&mut self, pulses: i32, step_m: f64) {
+        let (_, disturbance) = self.begin(Drive::OFF);
+        let before = self.pulses;
+        self.pulses += i64::from(pulses);
+        let speed = f64::from(pulses) * step_m / self.period_s;
+        let Some(motor) = &self.step_motor else {
+            self.plant.set_cart_speed(speed);
+            self.plant.advance(0.0, &self.torques, self.period_s, self.substeps);
+            self.plant.write_state(&mut self.state);
+            return;
+        };
+        let parts = motor.parts(self.period_s);
+        for part in 0..parts {
+            // Pulse j of n begins at (j + 1/2) / n of the tick.
+            let given = ((part as f64 + 0.5) / parts as f64 * f64::from(pulses)).round() as i64;
+            let commanded = [(before + given) as f64 * step_m, speed];
+            let force = motor.force_n(commanded, [self.state[0], self.state[1]]);
+            self.plant.advance(force + disturbance, &self.torques, self.period_s / parts as f64, 1);
+            self.plant.write_state(&mut self.state);
+        }
     }
 
     /// Begins a tick with the command `drive`: returns the command that acts in it, which is that of the tick before
@@ -199,6 +247,7 @@ impl Bench {
         let chain = rig.chain()?;
         let driver = &rig.reality.driver;
         let is_simple = rig.actuator.motor.is_none()
+            && rig.actuator.acceleration.is_none()
             && Driver::of(rig).is_none()
             && driver.latency_s == 0.0
             && driver.jitter_s == 0.0;
@@ -256,7 +305,7 @@ impl Bench {
             (Some(driver), _, motor) => driver.force(drive, motor.as_ref(), speed, dt),
             (None, Drive::Force(force), _) => f64::from(force),
             (None, Drive::Duty(duty), Some(motor)) => motor.force(f64::from(duty), speed),
-            (None, Drive::Duty(_), None) => 0.0,
+            (None, Drive::Duty(_), None) | (None, Drive::Steps(_), _) => 0.0,
         }
     }
 }

@@ -62,7 +62,10 @@ pub(super) fn alone(
 ) -> Result<Option<Fall>, SimulationError> {
     loop {
         let command = run.control()?;
-        let force = run.bench.tick(command.drive);
+        let mut force = run.bench.tick(command.drive);
+        if let Drive::Steps(_) = command.drive {
+            force = f64::from(command.applied_n);
+        }
         if let ControlFlow::Break(fall) = run.finish(&command, force, observe) {
             return Ok(fall);
         }
@@ -104,6 +107,9 @@ impl<'a> ClosedLoopRun<'a> {
         sensors: usize,
         scenario: &'a Scenario,
     ) -> Result<Self, SimulationError> {
+        if rig.actuator.acceleration.is_some() && scenario.sensing == Sensing::FullState {
+            return Err(SimulationError::FullState);
+        }
         controller.select(scenario.law)?;
         let bench = Bench::new(rig, scenario)?;
         let (mut counters, mut at_zero) = (vec![0; sensors], vec![0; sensors]);

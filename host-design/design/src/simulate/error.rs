@@ -26,6 +26,12 @@ pub enum SimulationError {
     /// A disturbing force that is not finite.
     #[error("a constant force of {0} N is not possible: give a finite number")]
     Offset(f64),
+    /// A run with the whole state measured, of a drive that counts its own pulses.
+    #[error(
+        "a drive that imposes the cart's acceleration is simulated from encoders only, because what it knows of the \
+         cart is its own pulses: add [kalman], and leave --full-state out"
+    )]
+    FullState,
     /// A run whose record would not fit into memory.
     #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
     TooLong {

@@ -8,7 +8,7 @@ use upright::supervision::fault::Fault;
 use super::scenario::Scenario;
 use super::trace::Trace;
 use crate::plant::absolute_angles;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::{CartInput, PlantDescription, Rig};
 
 /// Loss of balance, which ends a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -95,9 +95,12 @@ pub struct Summary {
     pub undershoot_percent: Option<f64>,
     /// Largest absolute relative angle of each link (rad).
     pub peak_angles_rad: Vec<f64>,
-    /// Largest absolute force on the cart (N).
+    /// What the drive imposes on the cart.
+    #[serde(skip_serializing_if = "CartInput::is_force")]
+    pub input: CartInput,
+    /// Largest absolute force on the cart (N), or acceleration of the cart (m/s²) where the drive imposes that.
     pub peak_force_n: f64,
-    /// Largest absolute force that the law requested (N).
+    /// Largest absolute force or acceleration that the law requested.
     pub peak_requested_force_n: f64,
     /// Set-point minus output at the end (m).
     pub final_error_m: f64,
@@ -151,6 +154,7 @@ impl Summary {
             overshoot_percent: percent(beyond),
             undershoot_percent: percent(against),
             peak_angles_rad,
+            input: rig.actuator.input(),
             peak_force_n,
             peak_requested_force_n,
             final_error_m,
@@ -177,8 +181,11 @@ impl fmt::Display for Summary {
             writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
         }
         // A model has no angles, and units of its own.
-        let [input, n, m] =
-            if self.peak_angles_rad.is_empty() { ["input", "", ""] } else { ["force", " N", " m"] };
+        let [input, n, m] = match self.input {
+            _ if self.peak_angles_rad.is_empty() => ["input", "", ""],
+            CartInput::Force => ["force", " N", " m"],
+            CartInput::Acceleration => ["accel", " m/s²", " m"],
+        };
         let (peak, requested) = (self.peak_force_n, self.peak_requested_force_n);
         writeln!(f, "  peak {input}     {peak:.3}{n} (requested: {requested:.3}{n})")?;
         write!(f, "  final error    {:.2e}{m}", self.final_error_m)

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::{CartInput, PlantDescription, Rig};
 
 /// The record of a run, tick by tick.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,9 +21,10 @@ pub struct Sample<S> {
     pub target: f64,
     /// Governed set-point, which the law follows (m).
     pub setpoint: f64,
-    /// Force that the law requests in this tick (N).
+    /// Force that the law requests in this tick (N); acceleration (m/s²) where the drive imposes that.
     pub requested: f64,
-    /// Force on the cart at the start of this tick, without the disturbance (N).
+    /// Force on the cart at the start of this tick, without the disturbance (N); the acceleration that the drive is
+    /// given (m/s²).
     pub force: f64,
     /// True state at the start of the tick.
     pub state: S,
@@ -45,7 +46,11 @@ impl Trace {
             }
             PlantDescription::Model(model) => (0..model.b.len()).map(|i| format!("state{i}")).collect(),
         };
-        let leading: [&str; LEADING] = ["t_s", "target_m", "setpoint_m", "force_requested_n", "force_n"];
+        let [requested, input] = match rig.actuator.input() {
+            CartInput::Force => ["force_requested_n", "force_n"],
+            CartInput::Acceleration => ["acceleration_requested_m_per_s2", "acceleration_m_per_s2"],
+        };
+        let leading: [&str; LEADING] = ["t_s", "target_m", "setpoint_m", requested, input];
         let estimates = states.iter().map(|name| format!("{name}_estimated"));
         let columns: Vec<String> =
             leading.map(str::to_owned).into_iter().chain(states.clone()).chain(estimates).collect();

@@ -93,7 +93,7 @@ pub(super) fn score(
 /// Scales the mass of a body; body 0 is the cart. An inertia given in the file is scaled with the mass.
 fn scale_mass(chain: &mut Chain, body: usize, factor: f64) {
     match body.checked_sub(1) {
-        None => chain.cart.mass_kg *= factor,
+        None => chain.cart.mass_kg = chain.cart.mass_kg.map(|mass| factor * mass),
         Some(link) => {
             chain.links[link].mass_kg *= factor;
             chain.links[link].inertia_kg_m2 = chain.links[link].inertia_kg_m2.map(|inertia| inertia * factor);

@@ -238,6 +238,7 @@ fn narrow<const N: usize>(model: &ChainModel<N, f64>) -> ChainModel<N> {
         weight: vector(&model.weight),
         b: matrix(&model.b),
         b_reduced: matrix(&model.b_reduced),
+        reaction: vector(&model.reaction),
         cart_friction: model.cart_friction as f32,
         joint_frictions: vector(&model.joint_frictions),
     }

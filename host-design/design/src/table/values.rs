@@ -5,7 +5,7 @@ use core::ops::{Deref, DerefMut};
 use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use upright::table::{
-    GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, TABLE_FORMAT,
+    GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, StepMap, TABLE_FORMAT,
 };
 
 use super::any_size::{MAX_SENSORS, MAX_STATES, WidestTable, WithSize, widest, with_size};
@@ -13,7 +13,7 @@ use super::error::{NoTable, finite};
 use super::swing_up::SwingUpValues;
 use super::{contents, friction, supervision};
 use crate::design::{Certified, Design, Feedback, Kalman, Uncertified, detection_thresholds, setpoint_step};
-use crate::rig::{Motor, PlantDescription, Rig};
+use crate::rig::{AccelerationDrive, Motor, PlantDescription, Rig};
 
 /// Which gains go into a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +112,12 @@ impl TableValues {
                 .motor
                 .as_ref()
                 .map(|motor| motor_map(motor, rig.tick.period_s))
+                .transpose()?,
+            steps: rig
+                .actuator
+                .acceleration
+                .as_ref()
+                .map(|drive| step_map(drive, rig.tick.period_s))
                 .transpose()?,
             limits: supervision::limits(rig, steps)?,
             thresholds: supervision::thresholds(detection.as_ref()),
@@ -284,6 +290,19 @@ fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> 
         k_integral,
         n: finite("the precompensation gain", law.n.unwrap_or(0.0))?,
         setpoint_step: setpoint_step.map_or(f32::MAX, |step| step as f32),
+    })
+}
+
+fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable> {
+    Ok(StepMap {
+        step_m: finite("actuator.step_m", drive.step_m as f32)?,
+        acceleration_limit_m_per_s2: finite(
+            "actuator.acceleration_limit_m_per_s2",
+            drive.acceleration_limit_m_per_s2 as f32,
+        )?,
+        speed_limit_m_per_s: drive
+            .largest_speed_m_per_s(period_s)
+            .map_or(Ok(f32::MAX), |limit| finite("actuator.speed_limit_m_per_s", limit as f32))?,
     })
 }
 

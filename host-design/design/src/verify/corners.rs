@@ -82,8 +82,8 @@ pub(super) const MOST_LINKS: usize = 9;
 pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
     let mut wrong = rig.clone();
     if let Some(chain) = wrong.chain_mut() {
-        let masses = core::iter::once(&mut chain.cart.mass_kg)
-            .chain(chain.links.iter_mut().map(|link| &mut link.mass_kg));
+        let masses =
+            chain.cart.mass_kg.iter_mut().chain(chain.links.iter_mut().map(|link| &mut link.mass_kg));
         for (mass, factor) in masses.zip(factors) {
             *mass *= 1.0 + 0.01 * percent * factor;
         }

@@ -120,7 +120,8 @@ pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario
 }
 
 fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) -> f64) {
-    chain.cart.mass_kg *= 1.0 + between(spread.mass);
+    let factor = 1.0 + between(spread.mass);
+    chain.cart.mass_kg = chain.cart.mass_kg.map(|mass| factor * mass);
     chain.cart.friction_n_s_per_m *= 1.0 + between(spread.friction);
     for link in &mut chain.links {
         let (mass, length) = (1.0 + between(spread.mass), 1.0 + between(spread.length));

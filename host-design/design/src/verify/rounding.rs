@@ -161,6 +161,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
             effect: single.effect.map(f64::from),
         }),
         motor: None,
+        steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
         crc: 0,

@@ -29,7 +29,7 @@ fn absolute(state: &[f64]) -> (Vec<f64>, Vec<f64>) {
 /// Mechanical energy from the motion of each centre of mass, directly from the geometry of the rig.
 fn energy_of_masses(chain: &Chain, state: &[f64]) -> f64 {
     let (phi, rate) = absolute(state);
-    let mut energy = 0.5 * chain.cart.mass_kg * state[1] * state[1];
+    let mut energy = 0.5 * chain.cart.mass_kg.unwrap() * state[1] * state[1];
     let (mut joint_height, mut joint_velocity) = (0.0, (state[1], 0.0));
     for (i, link) in chain.links.iter().enumerate() {
         let (m, l) = (link.mass_kg, link.length_m);

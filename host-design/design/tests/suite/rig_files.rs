@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use upright_design::plant::MotorPlant;
 use upright_design::rig::{
-    Absent, Actuator, Cart, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement, Rig, SECTIONS,
-    TOP, Tick, defaults, key_table, unit_in_names,
+    Absent, Actuator, Cart, CartInput, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement,
+    Rig, SECTIONS, TOP, Tick, defaults, key_table, unit_in_names,
 };
 
 const MINIMAL: &str = r#"
@@ -39,7 +39,8 @@ fn every_rig_file_is_good_and_named_after_its_rig() {
     for file in files {
         let rig = Rig::from_path(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(file.file_stem().unwrap().to_str().unwrap(), rig.name);
-        assert!(rig.lqr.is_some() && rig.pole_placement.is_some());
+        assert!(rig.lqr.is_some());
+        assert!(rig.pole_placement.is_some() || rig.actuator.acceleration.is_some());
         assert!(rig.kalman.is_some() || matches!(rig.plant, PlantDescription::Model(_)));
     }
 }
@@ -49,7 +50,7 @@ fn the_paper_rig_has_the_papers_values() {
     let rig = Rig::from_path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/quadruple-paper.toml"))
         .unwrap();
     let chain = rig.chain().unwrap();
-    assert_eq!(chain.cart.mass_kg, 0.1);
+    assert_eq!(chain.cart.mass_kg, Some(0.1));
     assert_eq!(chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), [0.03, 0.04, 0.07, 0.10]);
     assert!(chain.links.iter().all(|link| link.mass_kg == 0.1 && link.inertia_kg_m2.is_none()));
     assert_eq!(rig.states(), 10);
@@ -73,15 +74,21 @@ fn what_is_left_out_gets_its_documented_default() {
         friction_n_m_s_per_rad: 0.0,
         encoder: None,
     };
-    let cart = Cart { mass_kg: 1.0, friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
+    let cart =
+        Cart { mass_kg: Some(1.0), friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
     let expected = Rig {
         verify: Default::default(),
         reality: Default::default(),
         robust: None,
         swing_up: None,
         name: "minimal".to_owned(),
-        plant: PlantDescription::Chain(Chain { cart, links: vec![link], gravity_m_per_s2: 9.81 }),
-        actuator: Actuator { force_limit_n: None, motor: None },
+        plant: PlantDescription::Chain(Chain {
+            cart,
+            links: vec![link],
+            gravity_m_per_s2: 9.81,
+            input: CartInput::Force,
+        }),
+        actuator: Actuator { force_limit_n: None, motor: None, acceleration: None },
         tick: Tick { period_s: 0.001, delay_ticks: 0 },
         lqr: None,
         pole_placement: None,
@@ -223,6 +230,9 @@ fn the_hash_sees_every_value() {
             let Some((key, value)) = line.split('#').next().unwrap_or_default().split_once('=') else {
                 continue;
             };
+            if key.trim() == "kind" {
+                continue; // another kind has other keys
+            }
             let value = if key.trim() == "name" {
                 value.replacen('"', "\"x", 1)
             } else if key.trim() == "delay_ticks" {
@@ -241,7 +251,7 @@ fn the_hash_sees_every_value() {
             assert_ne!(parse(&lines.join("\n")).hash(), hash, "{}: {}", file.display(), lines[index]);
             changed += 1;
         }
-        assert!(changed > 20);
+        assert!(changed > 15);
     }
 }
 

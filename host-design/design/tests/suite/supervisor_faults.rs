@@ -78,7 +78,9 @@ impl Injection {
         if tick < self.from {
             return;
         }
-        let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive;
+        let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive else {
+            panic!("pulses for a motor")
+        };
         *command = match self.defect {
             Defect::MotorDead => 0.0,
             Defect::MotorReversed => -*command,

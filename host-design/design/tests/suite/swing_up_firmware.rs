@@ -124,6 +124,7 @@ fn raised_with(rig: &Rig, table: &TableValues, wrong: Wrong) -> (Option<Fault>, 
             harness.bench.tick(match output.drive {
                 Drive::Force(force) => Drive::Force(factor * force),
                 Drive::Duty(duty) => Drive::Duty(factor * duty),
+                Drive::Steps(_) => panic!("pulses for a motor"),
             });
             let mut inputs = harness.inputs();
             disturb(&mut inputs, &zero, wrong);

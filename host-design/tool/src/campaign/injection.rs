@@ -155,7 +155,8 @@ impl<'a> Injection<'a> {
 
     /// Changes the output to the motor; returns whether the effect by now differs visibly from a healthy rig.
     pub(super) fn output(&mut self, output: &mut Output) -> bool {
-        let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive;
+        // The whole firmware gives no pulses.
+        let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive else { return false };
         let asked = *command;
         let full = if self.table.motor.is_some() { 1.0 } else { self.full_force_n as f32 };
         *command = match self.trial.kind {

@@ -67,7 +67,9 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
         free = to;
     }
     dot(out, [MIDDLE, free], 3.0, "#000000")?;
-    text(out, [MIDDLE + 56.0, GROUND - 20.0], &format!("cart: {} kg", number(chain.cart.mass_kg)))?;
+    if let Some(mass_kg) = chain.cart.mass_kg {
+        text(out, [MIDDLE + 56.0, GROUND - 20.0], &format!("cart: {} kg", number(mass_kg)))?;
+    }
     let [left, right] = chain.cart.travel_m;
     text(out, [20.0, GROUND + 20.0], &format!("rail from {} to {} m", number(left), number(right)))?;
     let (bar, size) = scale_bar(scale);

@@ -91,7 +91,7 @@ fn cart_mass(exact: &Rig) -> Result<Erratum, ReproduceError> {
     ] {
         let mut rig = exact.clone();
         if let Some(chain) = rig.chain_mut() {
-            chain.cart.mass_kg = mass_kg;
+            chain.cart.mass_kg = Some(mass_kg);
             for link in &mut chain.links {
                 link.inertia_kg_m2 = if rods { None } else { Some(0.0) };
             }

@@ -53,7 +53,7 @@ impl Spring {
         let masses_kg: Vec<f64> = chain.links.iter().map(|link| link.mass_kg).collect();
         Self {
             lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
-            total_kg: chain.cart.mass_kg + masses_kg.iter().sum::<f64>(),
+            total_kg: chain.cart.mass_kg.unwrap_or_default() + masses_kg.iter().sum::<f64>(),
             masses_kg,
             gravity_m_per_s2: chain.gravity_m_per_s2,
             period_s,

@@ -118,7 +118,7 @@ impl<'a, 't> World<'a, 't> {
         let (spring, total_kg) = match &rig.plant {
             PlantDescription::Chain(chain) => {
                 let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
-                (Some(Spring::of(chain, period_s)), chain.cart.mass_kg + links)
+                (Some(Spring::of(chain, period_s)), chain.cart.mass_kg.unwrap_or_default() + links)
             }
             PlantDescription::Model(_) => (None, 1.0),
         };

@@ -61,8 +61,7 @@ impl Person<'_> {
         self.monitor.receive(self.session.last_bytes(), now);
         self.session.forget_received();
         if output.enable {
-            let (Drive::Force(drive) | Drive::Duty(drive)) = output.drive;
-            self.bench.tick(Drive::Force(self.motor * drive));
+            self.bench.tick(Drive::Force(self.motor * output.drive.value()));
             self.held[0] = self.bench.state()[0];
         } else {
             self.bench.hold(&self.held);

@@ -37,7 +37,7 @@ fn masses_lengths_and_inertias_are_those_of_the_bodies() {
     let rig = Rig::from_toml(&text, Path::new("double.toml")).unwrap();
     let chain = rig.chain().unwrap();
     let close = |x: f64, wanted: f64| assert!((x - wanted).abs() < 1e-9, "{x} instead of {wanted}:\n{text}");
-    close(chain.cart.mass_kg, 0.6);
+    close(chain.cart.mass_kg.unwrap(), 0.6);
     close(chain.cart.friction_n_s_per_m, 3.0);
     assert_eq!(chain.cart.travel_m, [-0.4, 0.5]);
     let [lower, upper] = &chain.links[..] else { panic!("{text}") };

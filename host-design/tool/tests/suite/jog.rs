@@ -60,6 +60,7 @@ impl Person<'_, '_> {
             (_, Machine::Still) => Drive::OFF,
             (Drive::Force(force), Machine::Reversed) => Drive::Force(-force),
             (Drive::Duty(duty), Machine::Reversed) => Drive::Duty(-duty),
+            (Drive::Steps(_), Machine::Reversed) => panic!("pulses for a motor"),
             (drive, Machine::Sound) => drive,
         };
         if output.enable {

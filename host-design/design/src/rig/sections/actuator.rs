@@ -1,4 +1,4 @@
-//! `[actuator]`: force limit and motor.
+//! `[actuator]`: force limit and motor, or a drive whose input is the cart's acceleration.
 
 use serde::Serialize;
 
@@ -7,15 +7,27 @@ use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
+use super::chain::CartInput;
+use super::tick::Tick;
 
 /// `[actuator]`
 pub(crate) static ACTUATOR: Section = Section {
     name: "actuator",
     title: "[actuator]",
-    meaning: "force limit and DC motor; if any motor key is given, the required motor keys must be given",
+    meaning: "with kind = \"force\": force limit and DC motor; if any motor key is given, the required motor keys must \
+              be given. With kind = \"acceleration\": a stepper, see drives.md",
     absent: Absent::Follows("no limit, no motor"),
-    keys: &[FORCE_LIMIT, Motor::KEYS],
+    keys: &[KIND, FORCE_LIMIT, Motor::KEYS, AccelerationDrive::KEYS],
 };
+
+const KIND: &[Key] = &[Key {
+    name: "kind",
+    unit: "",
+    rule: Rule::checked_by_its_section("\"force\" or \"acceleration\""),
+    meaning: "what the drive imposes on the cart: a force (DC motor, current-controlled servo), or an acceleration, \
+              whatever force that takes (stepper)",
+    absent: Absent::Follows("\"force\""),
+}];
 
 const FORCE_LIMIT: &[Key] = &[Key {
     name: "force_limit_n",
@@ -31,13 +43,51 @@ const DEAD_ZONE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v 
 const BRIDGE_DROP: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
 const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 
-/// The actuator, `[actuator]`: force limit and motor.
+/// The actuator, `[actuator]`: force limit and motor, or a drive that imposes the cart's acceleration.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Actuator {
     /// Largest force on the cart (N); none: no limit.
     pub force_limit_n: Option<f64>,
     /// The DC motor, if described.
     pub motor: Option<Motor>,
+    /// The drive, if it imposes the cart's acceleration; then there is neither force limit nor motor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<AccelerationDrive>,
+}
+
+impl Actuator {
+    /// What the drive imposes on the cart.
+    pub fn input(&self) -> CartInput {
+        if self.acceleration.is_some() { CartInput::Acceleration } else { CartInput::Force }
+    }
+}
+
+const WITH_ACCELERATION: Absent = Absent::RequiredIf("with kind = \"acceleration\"");
+
+keys! {
+    /// A drive that imposes the cart's acceleration, by step pulses.
+    pub struct AccelerationDrive {
+        acceleration_limit_m_per_s2: f64, "m/s²", Rule::POSITIVE,
+            "largest acceleration of the cart", WITH_ACCELERATION;
+        step_m: f64, "m", Rule::POSITIVE,
+            "travel of the cart per pulse, microsteps included", WITH_ACCELERATION;
+        speed_limit_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
+            "largest speed that the drive is asked for", Absent::Follows("no limit");
+        step_rate_limit_hz: Option<f64>, "Hz", Rule::POSITIVE,
+            "largest rate of pulses", Absent::Follows("no limit");
+    }
+}
+
+impl AccelerationDrive {
+    /// Largest speed (m/s): the smaller of the file's limit and what the rate of pulses allows, where given. A tick of
+    /// `period_s` (s) has up to a pulse more than its speed needs, because positions are rounded to steps.
+    pub fn largest_speed_m_per_s(&self, period_s: f64) -> Option<f64> {
+        let by_rate = self.step_rate_limit_hz.map(|rate_hz| (rate_hz - 1.0 / period_s) * self.step_m);
+        match (self.speed_limit_m_per_s, by_rate) {
+            (Some(limit), Some(by_rate)) => Some(limit.min(by_rate)),
+            (limit, by_rate) => limit.or(by_rate),
+        }
+    }
 }
 
 keys! {
@@ -117,11 +167,50 @@ impl Motor {
 }
 
 /// Reads `[actuator]`; a motor is described as soon as one of its keys is given.
-pub(crate) fn actuator(node: &Node<'_>) -> Result<Actuator, RigError> {
+pub(crate) fn actuator(node: &Node<'_>, tick: &Tick) -> Result<Actuator, RigError> {
     let table = node.table(&ACTUATOR)?;
+    let kind = table.get("kind").map(|node| node.one_of(["force", "acceleration"], &table.asks_for("kind")));
+    let is_acceleration = kind.transpose()? == Some(1);
+    let (foreign, accepts, remedy) = match is_acceleration {
+        true => (
+            [FORCE_LIMIT, Motor::KEYS].concat(),
+            "only with kind = \"force\"",
+            "leave it out: a drive that imposes the acceleration applies whatever force that takes",
+        ),
+        false => (
+            AccelerationDrive::KEYS.to_vec(),
+            "only with kind = \"acceleration\"",
+            "leave it out, or set kind = \"acceleration\" for a stepper",
+        ),
+    };
+    if let Some(node) = foreign.iter().find_map(|key| table.get(key.name)) {
+        return Err(node.out_of_range(accepts, remedy));
+    }
+    if is_acceleration {
+        let acceleration = Some(acceleration(&table, tick)?);
+        return Ok(Actuator { acceleration, ..Actuator::default() });
+    }
     let force_limit_n = table.value("force_limit_n")?;
     let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());
-    Ok(Actuator { force_limit_n, motor: described.then(|| motor(&table)).transpose()? })
+    let motor = described.then(|| motor(&table)).transpose()?;
+    Ok(Actuator { force_limit_n, motor, acceleration: None })
+}
+
+/// A tick needs room for pulses, and its pulses begin in the same tick.
+fn acceleration(table: &Table<'_>, tick: &Tick) -> Result<AccelerationDrive, RigError> {
+    let drive = AccelerationDrive::read(table)?;
+    let least_hz = 2.0 / tick.period_s;
+    match (table.get("step_rate_limit_hz"), drive.step_rate_limit_hz) {
+        (Some(node), Some(rate_hz)) if rate_hz < least_hz => Err(node.out_of_range(
+            &format!("a number >= {least_hz} (Hz), two pulses in a tick"),
+            "give the largest rate that driver and pulse generator take, or a longer period_s in [tick]",
+        )),
+        _ if tick.delay_ticks == 1 => Err(table.need("kind", "kind")?.out_of_range(
+            "\"force\" with delay_ticks = 1",
+            "leave delay_ticks in [tick] out: the pulses of a tick begin in that tick",
+        )),
+        _ => Ok(drive),
+    }
 }
 
 fn motor(table: &Table<'_>) -> Result<Motor, RigError> {

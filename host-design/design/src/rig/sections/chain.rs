@@ -43,14 +43,16 @@ const GRAVITY_M_PER_S2: f64 = 9.81;
 keys! {
     /// The cart and its rail, `[cart]`.
     pub struct Cart {
-        mass_kg: f64, "kg", Rule::POSITIVE,
-            "mass of the cart, with the equivalent mass of belt, gear and motor", Absent::Required;
+        mass_kg: Option<f64>, "kg", Rule::POSITIVE,
+            "mass of the cart, with the equivalent mass of belt, gear and motor",
+            Absent::RequiredIf("unless kind = \"acceleration\" in [actuator]");
         friction_n_s_per_m: f64, "N·s/m", Rule::NOT_NEGATIVE,
             "viscous friction of the cart on the rail", Absent::Numbers(&[0.0]);
         travel_m: [f64; 2], "m", Rule::AROUND_ZERO,
             "ends of the rail, with the start position 0 between them", Absent::Numbers(&[-2.0, 2.0]);
         encoder_step_m: Option<f64>, "m", Rule::POSITIVE,
-            "travel per encoder count", Absent::Follows("no encoder; required with [kalman]");
+            "travel per encoder count; none with kind = \"acceleration\", which counts its pulses",
+            Absent::Follows("no encoder; required with [kalman]");
     }
 }
 
@@ -63,6 +65,54 @@ pub enum PlantDescription {
     Model(LinearPlant),
 }
 
+/// What the drive imposes on the cart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub enum CartInput {
+    /// A force (N).
+    #[default]
+    Force,
+    /// An acceleration (m/s²), whatever force that takes.
+    Acceleration,
+}
+
+impl CartInput {
+    /// Whether it is a force.
+    pub fn is_force(&self) -> bool {
+        *self == CartInput::Force
+    }
+}
+
+impl Table<'_> {
+    /// The number of the key that belongs to `input`; the other one is refused.
+    pub(super) fn of_input(
+        &self,
+        input: CartInput,
+        force: &str,
+        acceleration: &str,
+    ) -> Result<f64, RigError> {
+        let ([wanted, other], kind) = match input {
+            CartInput::Force => ([force, acceleration], "acceleration"),
+            CartInput::Acceleration => ([acceleration, force], "force"),
+        };
+        if let Some(node) = self.get(other) {
+            let accepts = format!("only with kind = \"{kind}\" in [actuator]");
+            return Err(node.out_of_range(&accepts, &format!("give {wanted} instead, or change kind")));
+        }
+        self.value(wanted)
+    }
+
+    /// Refuses keys that a drive that imposes the cart's acceleration has no use for.
+    pub(super) fn refuse_for_acceleration(&self, keys: &[&str]) -> Result<(), RigError> {
+        match keys.iter().find_map(|key| self.get(key)) {
+            Some(node) => Err(node.out_of_range(
+                "only with kind = \"force\" in [actuator]",
+                "leave it out: a drive that imposes the cart's acceleration is not affected",
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
 /// A cart with n >= 1 links.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chain {
@@ -72,6 +122,9 @@ pub struct Chain {
     pub links: Vec<Link>,
     /// Acceleration of gravity (m/s²).
     pub gravity_m_per_s2: f64,
+    /// What the drive imposes on the cart.
+    #[serde(skip_serializing_if = "CartInput::is_force")]
+    pub input: CartInput,
 }
 
 impl PlantDescription {
@@ -85,21 +138,25 @@ impl PlantDescription {
 }
 
 /// Reads the plant, which the file gives either as a chain or as a linear model.
-pub(crate) fn plant(root: &Table<'_>) -> Result<PlantDescription, RigError> {
+pub(crate) fn plant(root: &Table<'_>, input: CartInput) -> Result<PlantDescription, RigError> {
     const ONE: &str = "keep [model], or [cart] with its [[link]]s and [gravity], not both";
     for part in ["cart", "link", "gravity"] {
         root.not_both("model", part, ONE)?;
     }
     match root.get("model") {
+        Some(node) if input == CartInput::Acceleration => {
+            let remedy = "describe the machine by [cart] and [[link]], or give [model] an input in any unit without kind";
+            Err(node.out_of_range("only with kind = \"force\" in [actuator]", remedy))
+        }
         Some(node) => model::model(&node).map(PlantDescription::Model),
-        None => chain(root).map(PlantDescription::Chain),
+        None => chain(root, input).map(PlantDescription::Chain),
     }
 }
 
-fn chain(root: &Table<'_>) -> Result<Chain, RigError> {
+fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
     const LINKS: &str = "one [[link]] table per link, from the cart outwards";
     let cart = root.need("cart", "[cart] and its [[link]]s, or [model]: the plant is not described")?;
-    let cart = Cart::read(&cart.table(&CART)?)?;
+    let cart = cart_driven_by(input, &cart.table(&CART)?)?;
     let links = root.need(LINK.name, LINKS)?;
     let entries = links.list("a list of tables", LINKS)?;
     if !(1..=MAX_LINKS).contains(&entries.len()) {
@@ -107,7 +164,22 @@ fn chain(root: &Table<'_>) -> Result<Chain, RigError> {
     }
     let gravity_m_per_s2 = root.get("gravity").map_or(Ok(GRAVITY_M_PER_S2), |node| gravity(&node))?;
     let links = entries.iter().map(|entry| link::link(entry, gravity_m_per_s2)).collect::<Result<_, _>>()?;
-    Ok(Chain { cart, links, gravity_m_per_s2 })
+    Ok(Chain { cart, links, gravity_m_per_s2, input })
+}
+
+/// A force moves a mass; a drive that imposes an acceleration also knows where it has put the cart.
+fn cart_driven_by(input: CartInput, table: &Table<'_>) -> Result<Cart, RigError> {
+    let cart = Cart::read(table)?;
+    match (input, table.get("encoder_step_m")) {
+        (CartInput::Force, _) if cart.mass_kg.is_none() => {
+            Err(table.missing("mass_kg", &table.asks_for("mass_kg")))
+        }
+        (CartInput::Acceleration, Some(node)) => Err(node.out_of_range(
+            "no encoder of the cart with kind = \"acceleration\" in [actuator]",
+            "leave it out: the drive's pulses are the position, and step_m of [actuator] is its step",
+        )),
+        _ => Ok(cart),
+    }
 }
 
 fn gravity(node: &Node<'_>) -> Result<f64, RigError> {

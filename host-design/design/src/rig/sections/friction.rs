@@ -5,7 +5,7 @@ use super::super::key::{Absent, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::super::value::{Keys, PerJoint, keys};
-use super::chain::PlantDescription;
+use super::chain::{CartInput, PlantDescription};
 
 /// `[friction]`
 pub(crate) static FRICTION: Section = Section {
@@ -49,6 +49,9 @@ pub(crate) fn friction(
         return Err(node.out_of_range("only with [kalman]", "add [kalman], or leave [friction] out"));
     }
     let table: Table<'_> = node.table(&FRICTION)?;
+    if chain.input == CartInput::Acceleration {
+        table.refuse_for_acceleration(&["cart_n", "cart_speed_m_per_s"])?;
+    }
     let known = KnownFriction::read(&table)?;
     if let Some(list) = table.get("joint_n_m").filter(Node::is_list) {
         list.numbers(chain.links.len(), Rule::ANY, &table.asks_for("joint_n_m"))?;

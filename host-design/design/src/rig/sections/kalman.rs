@@ -6,7 +6,7 @@ use super::super::error::RigError;
 use super::super::key::{Absent, Key, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
-use super::chain::PlantDescription;
+use super::chain::{CartInput, PlantDescription};
 use super::pole_placement;
 
 /// `[kalman]`
@@ -29,7 +29,14 @@ pub(crate) static KALMAN: Section = Section {
             unit: "N²·s",
             rule: Rule::NOT_NEGATIVE,
             meaning: "intensity of the force noise: variance times hold time",
-            absent: Absent::Required,
+            absent: Absent::RequiredIf("with kind = \"force\" in [actuator]"),
+        },
+        Key {
+            name: "acceleration_noise_m2_per_s3",
+            unit: "m²/s³",
+            rule: Rule::NOT_NEGATIVE,
+            meaning: "intensity of the noise of the cart's acceleration",
+            absent: Absent::RequiredIf("with kind = \"acceleration\""),
         },
         Key {
             name: "joint_noise",
@@ -48,7 +55,7 @@ const POLES_ACCEPTED: &str =
 /// `[kalman]`: continuous noise intensities, and poles if they are chosen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KalmanNoise {
-    /// Intensity of the force noise (N²·s).
+    /// Intensity of the input's noise: of the force (N²·s), or of the cart's acceleration (m²/s³).
     pub force_noise_n2_s: f64,
     /// Intensity of the torque noise at each joint ((N·m)²·s); with `[model]`, of each further noise column.
     pub joint_noise: Vec<f64>,
@@ -58,18 +65,25 @@ pub struct KalmanNoise {
 }
 
 /// Reads `[kalman]`, with one intensity per noise input.
-pub(crate) fn kalman(node: &Node<'_>, plant: &PlantDescription) -> Result<KalmanNoise, RigError> {
+pub(crate) fn kalman(
+    node: &Node<'_>,
+    plant: &PlantDescription,
+    input: CartInput,
+) -> Result<KalmanNoise, RigError> {
     let table = node.table(&KALMAN)?;
     let further = match plant {
         PlantDescription::Chain(chain) => chain.links.len(),
         PlantDescription::Model(model) => model.noise_input.as_ref().map_or(1, Vec::len) - 1,
     };
-    let force_noise_n2_s = table.value("force_noise_n2_s")?;
+    let force_noise_n2_s = table.of_input(input, "force_noise_n2_s", "acceleration_noise_m2_per_s3")?;
     let joint_noise = if further == 0 && table.get("joint_noise").is_none() {
         Vec::new()
     } else {
         table.numbers("joint_noise", further, Rule::NOT_NEGATIVE)?
     };
+    if input == CartInput::Acceleration {
+        table.refuse_for_acceleration(&["observer_poles"])?;
+    }
     let observer_poles = match table.get("observer_poles") {
         Some(node) => observer_poles(&node, plant, &table.asks_for("observer_poles"))?,
         None => Vec::new(),

@@ -5,7 +5,7 @@ use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
-use super::chain::PlantDescription;
+use super::chain::{CartInput, PlantDescription};
 
 /// `[limits]`
 pub(crate) static LIMITS: Section = Section {
@@ -69,8 +69,15 @@ impl Default for Limits {
 }
 
 /// Reads `[limits]`; the margin at the rail's ends has to leave the start position free.
-pub(crate) fn limits(node: &Node<'_>, plant: &PlantDescription) -> Result<Limits, RigError> {
+pub(crate) fn limits(
+    node: &Node<'_>,
+    plant: &PlantDescription,
+    input: CartInput,
+) -> Result<Limits, RigError> {
     let table = node.table(&LIMITS)?;
+    if input == CartInput::Acceleration {
+        table.refuse_for_acceleration(&["jog_force_n", "supply_min_v", "supply_time_s"])?;
+    }
     let limits = Limits::read(&table)?;
     let PlantDescription::Chain(chain) = plant else { return Ok(limits) };
     let [low, high] = chain.cart.travel_m;

@@ -6,6 +6,7 @@ use super::super::error::RigError;
 use super::super::key::{Absent, Key, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
+use super::chain::CartInput;
 
 /// `[lqr]`
 pub(crate) static LQR: Section = Section {
@@ -29,7 +30,14 @@ pub(crate) static LQR: Section = Section {
             unit: "",
             rule: Rule::POSITIVE,
             meaning: "weight r of the squared force; with r = 0 there would be no optimum",
-            absent: Absent::Required,
+            absent: Absent::RequiredIf("with kind = \"force\" in [actuator]"),
+        },
+        Key {
+            name: "acceleration_weight",
+            unit: "",
+            rule: Rule::POSITIVE,
+            meaning: "the same weight of the cart's squared acceleration",
+            absent: Absent::RequiredIf("with kind = \"acceleration\""),
         },
         Key {
             name: "cross_weights",
@@ -61,7 +69,7 @@ pub(crate) static LQR: Section = Section {
 pub struct Lqr {
     /// Diagonal of Q, one weight per state.
     pub state_weights: Vec<f64>,
-    /// Weight r > 0 of the squared force.
+    /// Weight r > 0 of the squared input: force, or acceleration of the cart.
     pub force_weight: f64,
     /// The entries of Q beside its diagonal, as a symmetric matrix with zeros on the diagonal; empty if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -117,13 +125,14 @@ impl Lqr {
 }
 
 /// Reads `[lqr]`, with one weight per state. `is_chain`: whether the states are those of a chain of links.
-pub(crate) fn lqr(node: &Node<'_>, states: usize, is_chain: bool) -> Result<Lqr, RigError> {
+pub(crate) fn lqr(node: &Node<'_>, states: usize, is_chain: bool, input: CartInput) -> Result<Lqr, RigError> {
     let table = node.table(&LQR)?;
     let weights = table.required("state_weights")?;
     let is_matrix = weights
         .list("a list", &table.asks_for("state_weights"))
         .is_ok_and(|entries| entries.first().is_some_and(Node::is_list));
-    let mut lqr = Lqr { force_weight: table.value("force_weight")?, ..Lqr::default() };
+    let mut lqr =
+        Lqr { force_weight: table.of_input(input, "force_weight", "acceleration_weight")?, ..Lqr::default() };
     if is_matrix {
         (lqr.state_weights, lqr.mixed_weights) =
             full_weights(&weights, states, &table.asks_for("state_weights"))?;

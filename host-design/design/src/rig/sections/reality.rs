@@ -5,7 +5,7 @@ use super::super::key::{Absent, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::super::value::{Keys, PerJoint, keys};
-use super::chain::{Chain, PlantDescription};
+use super::chain::{CartInput, Chain, PlantDescription};
 
 /// `[reality]`
 pub(crate) static REALITY: Section = Section {
@@ -18,6 +18,7 @@ pub(crate) static REALITY: Section = Section {
         AirDrag::KEYS,
         DriveTrain::KEYS,
         DriverFaults::KEYS,
+        StepMotorData::KEYS,
         SensorErrors::KEYS,
         ParameterErrors::KEYS,
     ],
@@ -84,6 +85,20 @@ keys! {
 }
 
 keys! {
+    /// The motor of a drive with pulses, which is a spring between its field and its rotor.
+    pub struct StepMotorData {
+        holding_force_n: Option<f64>, "N", Rule::POSITIVE,
+            "largest force of a step motor at rest, a full step away", Absent::Follows("it goes where its pulses say");
+        full_step_m: Option<f64>, "m", Rule::POSITIVE,
+            "travel of the cart per full step of the motor", Absent::RequiredIf("with holding_force_n");
+        corner_speed_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
+            "speed at which 71 % of that force is left", Absent::Follows("the force does not fall");
+        motor_damping_percent: f64, "%", Rule::NOT_NEGATIVE,
+            "damping of the motor's resonance with the cart", Absent::Numbers(&[10.0]);
+    }
+}
+
+keys! {
     /// Errors of the encoders and of their zeros, and the slope of the rail.
     pub struct SensorErrors {
         homing_error_rad: PerJoint, "rad", EACH_ANGLE, "measured minus true angle of each joint", NONE;
@@ -123,6 +138,8 @@ pub struct Reality {
     pub drive_train: DriveTrain,
     /// Motor driver, supply and timing.
     pub driver: DriverFaults,
+    /// The motor of a drive with pulses.
+    pub step_motor: StepMotorData,
     /// Encoders, their zeros, and the slope of the rail.
     pub sensors: SensorErrors,
     /// Errors of masses, lengths and inertias.
@@ -140,6 +157,7 @@ impl Default for Reality {
             air_drag: absent(),
             drive_train: absent(),
             driver: absent(),
+            step_motor: absent(),
             sensors: absent(),
             parameters: absent(),
         }
@@ -163,6 +181,7 @@ pub(crate) fn reality(
         air_drag: AirDrag::read(&table)?,
         drive_train: DriveTrain::read(&table)?,
         driver: DriverFaults::read(&table)?,
+        step_motor: StepMotorData::read(&table)?,
         sensors: SensorErrors::read(&table)?,
         parameters: ParameterErrors::read(&table)?,
     };
@@ -181,6 +200,32 @@ fn lists_fit(table: &Table<'_>, joints: usize) -> Result<(), RigError> {
     Ok(())
 }
 
+/// A step motor moves a mass and has steps; only with it do friction and mass of the cart matter.
+fn step_motor(table: &Table<'_>, motor: &StepMotorData, chain: &Chain) -> Result<(), RigError> {
+    if let (CartInput::Force, Some(key)) =
+        (chain.input, StepMotorData::KEYS.iter().find(|key| table.get(key.name).is_some()))
+    {
+        let accepts = "only with kind = \"acceleration\" in [actuator]";
+        return Err(table.required(key.name)?.out_of_range(accepts, "leave it out, or describe a stepper"));
+    }
+    match table.get("holding_force_n") {
+        None if chain.input == CartInput::Acceleration => table.refuse_for_acceleration(&[
+            "cart_friction_n",
+            "stribeck_m_per_s",
+            "presliding_m",
+            "cart_mass_percent",
+        ]),
+        Some(node) if chain.cart.mass_kg.is_none() => Err(node.out_of_range(
+            "only with mass_kg of [cart]",
+            "give the mass that the motor moves, rotor included",
+        )),
+        Some(_) if motor.full_step_m.is_none() => {
+            Err(table.missing("full_step_m", &table.asks_for("full_step_m")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Conditions that involve other values of the file.
 fn within_the_rig(
     table: &Table<'_>,
@@ -193,7 +238,13 @@ fn within_the_rig(
         Some(node) => Err(node.out_of_range(accepts, remedy)),
         None => Ok(()),
     };
-    if reality.drive_train.rotor_mass_kg.is_some_and(|mass| mass >= chain.cart.mass_kg) {
+    if chain.input == CartInput::Acceleration {
+        let keys = [DriveTrain::KEYS, DriverFaults::KEYS].concat();
+        let of_force: Vec<&str> = keys.iter().map(|key| key.name).collect();
+        table.refuse_for_acceleration(&of_force)?;
+    }
+    step_motor(table, &reality.step_motor, chain)?;
+    if reality.drive_train.rotor_mass_kg.zip(chain.cart.mass_kg).is_some_and(|(mass, cart)| mass >= cart) {
         refused("rotor_mass_kg", "a number > 0 and < mass_kg of [cart]", "give the smaller part of it")?;
     }
     let DriverFaults { latency_s, jitter_s, .. } = reality.driver;

@@ -22,13 +22,14 @@ pub(crate) fn rod(mass_kg: f64, length_m: f64) -> Link {
 pub(crate) fn chain(cart_mass_kg: f64, links: Vec<Link>) -> Chain {
     Chain {
         cart: Cart {
-            mass_kg: cart_mass_kg,
+            mass_kg: Some(cart_mass_kg),
             friction_n_s_per_m: 0.0,
             travel_m: [-2.0, 2.0],
             encoder_step_m: None,
         },
         links,
         gravity_m_per_s2: 9.81,
+        input: Default::default(),
     }
 }
 

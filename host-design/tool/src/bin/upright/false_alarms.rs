@@ -53,6 +53,7 @@ pub(crate) struct HealthyHoursCommand {
 impl HealthyHoursCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
+        rig.refuse_acceleration("false-alarms")?;
         let laws: Vec<Law> = table
             .laws
             .present()

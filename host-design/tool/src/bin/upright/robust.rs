@@ -80,6 +80,7 @@ pub(crate) struct RobustCommand {
 impl RobustCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        rig.refuse_acceleration("robust")?;
         let tolerances = self.tolerances(&rig);
         let settings =
             JudgeSettings { runs: self.runs.into(), duration_s: self.duration, ..JudgeSettings::of(&rig) };

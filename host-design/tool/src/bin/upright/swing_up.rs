@@ -144,6 +144,7 @@ impl SwingUpCommand {
 
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        rig.refuse_acceleration("swing-up")?;
         let failed = |source: SwingUpError| Failure::of(&rig.name, source);
         if self.table {
             // The outcome depends on the motions as well as on the rig file.

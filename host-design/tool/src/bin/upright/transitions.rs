@@ -63,6 +63,7 @@ fn numbers(text: &str) -> Result<(u64, u64), String> {
 impl TransitionsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        rig.refuse_acceleration("transitions")?;
         let links = rig.links();
         let swing_up = Stored::beside(&self.rig)
             .and_then(|stored| motions(&rig, &stored))

@@ -122,6 +122,7 @@ fn random_plants(
 impl VerifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, certified, mut table) = self.variation.designed()?;
+        rig.refuse_acceleration("verify")?;
         for other in Law::ALL.into_iter().filter(|law| self.law.is_some_and(|only| only != *law)) {
             table.laws[other] = None;
         }

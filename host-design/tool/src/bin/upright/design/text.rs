@@ -2,8 +2,10 @@
 
 use core::fmt::Write;
 
-use upright_design::design::{Certified, DesignPoles, Feedback};
+use upright::table::Law;
+use upright_design::design::{Certified, DesignPoles, DriveLimits, Feedback};
 use upright_design::number::{self, significant};
+use upright_design::reality::StepMotor;
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::{LawValues, TableValues};
 
@@ -53,6 +55,15 @@ fn write_design(
              rounding to f32 changes no gain by more than {:.1e}, relative",
             assessment.exact, assessment.rounded, assessment.continuous_at_tick, assessment.largest_rounding
         )?;
+        if law == Law::Lqr
+            && let Some(DriveLimits { resonance_hz, bandwidth_hz }) = DriveLimits::of(rig, &certified.double)
+        {
+            writeln!(
+                out,
+                "  the drive has to follow: resonance at least {resonance_hz:.1} Hz, or a servo with a bandwidth of at \
+                 least {bandwidth_hz:.1} Hz"
+            )?;
+        }
         match &report.run {
             Some(run) => writeln!(out, "  closed loop, firmware against {plant}: {run}")?,
             None => writeln!(out, "  no closed loop: this design makes no table")?,
@@ -128,9 +139,19 @@ pub(super) fn warnings(
             "the loop is too slow for a bound on its step response: the set-point is not governed".to_owned(),
         );
     }
-    if rig.force_limit_n().is_none() {
+    if rig.input_limit().is_none() {
         warnings
             .push("no force limit: give actuator.force_limit_n or a motor before connecting one".to_owned());
+    }
+    let motor = StepMotor::of(rig).zip(rig.chain()).and_then(|(motor, chain)| motor.resonance_hz(chain));
+    if let (Some(found_hz), Some(limits)) = (motor, DriveLimits::of(rig, &certified.double))
+        && found_hz < limits.resonance_hz
+    {
+        warnings.push(format!(
+            "the motor of [reality] resonates with the cart at {found_hz:.0} Hz, below the {:.0} Hz that the loop needs: take \
+             a stronger motor, a lighter cart or less acceleration",
+            limits.resonance_hz
+        ));
     }
     if reports.is_empty() {
         warnings.push("the rig file asks for no control law: add [lqr] or [pole_placement]".to_owned());

@@ -22,6 +22,7 @@ pub(super) fn built(kind: ImageKind, rig: Option<&Path>, wanted: Wanted) -> Resu
 /// Reads this rig file and designs its table, with the stored motions.
 pub(super) fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
+    rig.refuse_acceleration("firmware")?;
     let (_, table) = with_table(&rig, path, Gains::Sampled)?;
     let table = with_stored_motions(path, &rig, table, wanted)?;
     Ok((rig, table))
