@@ -27,7 +27,7 @@ impl Tolerances {
         Self {
             mass_percent: MASS_PERCENT,
             joint_friction_n_m: JOINT_SHARE * least_n_m,
-            cart_friction_n: CART_SHARE * gravity * (chain.cart.mass_kg + outer_kg),
+            cart_friction_n: CART_SHARE * gravity * (chain.cart.mass_kg.unwrap_or_default() + outer_kg),
             homing_error_rad: JOINT_SHARE,
             latency_s: 0.0,
         }
