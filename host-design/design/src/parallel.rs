@@ -8,6 +8,7 @@
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::thread::Builder;
 
 use rayon::prelude::*;
 
@@ -85,6 +86,25 @@ where
 /// Runs two computations in parallel and returns both results.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
+}
+
+/// Runs `others` for 0 to `count` - 1 in a thread each, while `own` runs in this one. Where no thread can be started,
+/// as in a browser, they run one after the other.
+pub(crate) fn beside<A: Send, B>(
+    count: u64,
+    others: &(dyn Fn(u64) -> A + Sync),
+    own: impl FnOnce() -> B,
+) -> (Vec<A>, B) {
+    std::thread::scope(|scope| {
+        let start = |number| Builder::new().spawn_scoped(scope, move || others(number));
+        let threads: Vec<_> = (0..count).map(start).collect();
+        let own = own();
+        let ended = threads.into_iter().zip(0..).map(|(thread, number)| match thread {
+            Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(_) => others(number),
+        });
+        (ended.collect(), own)
+    })
 }
 
 /// Calls `one` for 0 to `count` - 1. Each call is a separate task, because their durations may differ widely.

@@ -15,6 +15,7 @@
 //! | [`reproduce`] | the paper's results beside ours |
 //! | [`identified`] | results of an identification, as text, JSON, page and rig file |
 //! | [`twin`] | the live twin: a page on which the rig moves |
+//! | [`site`] | the whole of it in a page, with nothing to install |
 //! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
@@ -41,4 +42,5 @@ pub mod monitor;
 pub mod project;
 pub mod report;
 pub mod reproduce;
+pub mod site;
 pub mod twin;

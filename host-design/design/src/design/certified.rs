@@ -4,6 +4,7 @@ use super::error::DesignError;
 use super::loops::DesignPoles;
 use super::synthesis::{Design, Laws, continuous_plant};
 use crate::numerics::{Wide, with_precision};
+use crate::parallel;
 use crate::rig::Rig;
 use upright::table::Law;
 
@@ -106,12 +107,12 @@ fn certified((rounded, exact): (Uncertified, Design<Wide>), bits: usize) -> Cert
 #[doc(alias = "acker")]
 #[doc(alias = "kalman")]
 pub fn design(rig: &Rig) -> Result<Certified, DesignError> {
-    let (first, second) = std::thread::scope(|scope| {
-        let first = scope.spawn(|| attempt(rig, FIRST_BITS).map(|(design, _)| design));
-        let second = attempt(rig, 2 * FIRST_BITS);
-        (first.join(), second)
-    });
-    let first = first.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let (mut first, second) = parallel::beside(
+        1,
+        &|_| attempt(rig, FIRST_BITS).map(|(design, _)| design), //
+        || attempt(rig, 2 * FIRST_BITS),
+    );
+    let first = first.swap_remove(0);
     if agree(&first, &second) {
         return second.map(|second| certified(second, 2 * FIRST_BITS));
     }

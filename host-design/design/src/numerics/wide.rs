@@ -4,7 +4,7 @@ use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use std::cell::{Cell, RefCell};
 
-use astro_float_num::{BigFloat, Consts, RoundingMode, Sign};
+use astro_float_num::{BigFloat, Consts, RoundingMode, Sign, WORD_BIT_SIZE};
 
 use super::Real;
 
@@ -204,10 +204,9 @@ fn nearest(x: &BigFloat, format: &Format) -> u64 {
     if x.is_zero() {
         return sign;
     }
-    // x = 0.w · 2^exponent with the top bit of the last word set: 1.f · 2^(exponent - 1).
-    let (Some(&top), rest) = (words.last(), &words[..words.len().saturating_sub(1)]) else {
-        return sign;
-    };
+    // x = 0.w · 2^exponent with the top bit of the last word set: 1.f · 2^(exponent - 1). Words have 64 bits, or 32.
+    let (rest, high) = words.split_at(words.len().saturating_sub(64 / WORD_BIT_SIZE));
+    let top = high.iter().rfold(0, |top: u64, &word| top.unbounded_shl(WORD_BIT_SIZE as u32) | word as u64);
     let sticky = rest.iter().any(|&word| word != 0);
     let exponent = i64::from(exponent) - 1;
     let min_exponent = 1 - format.max_exponent;

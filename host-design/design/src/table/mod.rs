@@ -20,6 +20,7 @@ mod source;
 mod supervision;
 mod swing_up;
 mod values;
+#[cfg(not(target_family = "wasm"))]
 mod write;
 
 pub(crate) use any_size::widest;
@@ -28,4 +29,5 @@ pub use error::NoTable;
 pub use source::{gains_source, identity_differences};
 pub use swing_up::{MotionValues, SwingUpValues};
 pub use values::{Gains, LawValues, TableValues};
+#[cfg(not(target_family = "wasm"))]
 pub use write::{WriteError, write_atomically};

@@ -8,6 +8,7 @@ use upright::table::{Law, PerLaw};
 use super::VerifyError;
 use crate::design::{Certified, Design, Laws, OBSERVER, Pole, Task, continuous_plant, wanted_poles};
 use crate::numerics::{Matrix, Real, Wide, eigenvalues, with_precision};
+use crate::parallel;
 use crate::plant::LinearModel;
 use crate::rig::Rig;
 
@@ -54,19 +55,9 @@ impl Certificates {
             let mut residuals = Vec::new();
             Ok((Design::sampled_alone(rig, plant, &mut residuals)?, residuals))
         };
-        let (mut solved, mut disturbed) = (None, Vec::new());
-        std::thread::scope(|scope| {
-            let draws: Vec<_> = (0..DRAWS)
-                .map(|seed| {
-                    // A new thread starts at the usual precision.
-                    scope.spawn(move || with_precision(certified.bits[0], || solve(Some(seed))))
-                })
-                .collect();
-            solved = Some(solve(None));
-            disturbed
-                .extend(draws.into_iter().map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p))));
-        });
-        let Some(solved) = solved else { return Err(VerifyError::Poles) };
+        // A new thread starts at the usual precision.
+        let draw = |seed| with_precision(certified.bits[0], || solve(Some(seed)));
+        let (disturbed, solved) = parallel::beside(DRAWS, &draw, || solve(None));
         let (nominal, residuals) = solved?;
         let disturbed: Vec<Design<Wide>> =
             disturbed.into_iter().map(|d| d.map(|(design, _)| design)).collect::<Result<_, _>>()?;

@@ -1,16 +1,34 @@
-//! The compiler for the microcontroller: that of rustup if it has the target, otherwise Debian's.
+//! The compiler for another target than this computer: that of rustup if it has the target, otherwise Debian's.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::error::{BuildError, TARGET};
+use crate::project::NoCheckout;
 use crate::project::checkout;
 
 /// Debian's compiler, which can build Rust's core library from `rust-web-src`.
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// A `cargo` that compiles for [`TARGET`].
+/// Targets that are compiled together, and what Debian's compiler needs for them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ForeignTarget<'a> {
+    /// Their names.
+    pub(crate) names: &'a [&'a str],
+    /// Folder for what is built, in the target directory.
+    pub(crate) folder: &'static str,
+    /// The standard libraries that Debian's compiler builds from source.
+    pub(crate) libraries: &'static str,
+    /// Their linker.
+    pub(crate) linker: &'static str,
+}
+
+/// The microcontroller.
+const MICROCONTROLLER: ForeignTarget<'static> =
+    ForeignTarget { names: &[TARGET], folder: "firmware", libraries: "-Zbuild-std=core", linker: "ld.lld" };
+
+/// A `cargo` that compiles for another target.
 #[derive(Debug)]
 pub struct Compiler {
     /// Name of the program, for messages.
@@ -24,23 +42,42 @@ pub struct Compiler {
     pub target_directory: PathBuf,
 }
 
-/// The compiler that is installed.
+/// The compiler for the microcontroller that is installed.
 ///
 /// # Errors
 /// [`BuildError::NoCompiler`] if there is none.
 pub fn compiler() -> Result<Compiler, BuildError> {
-    let target_directory = target_directory()?;
-    let mut compiler = if rustup_has_the_target() {
+    compiler_for(MICROCONTROLLER)?.ok_or(BuildError::NoCompiler)
+}
+
+/// The compiler for all of these microcontrollers that is installed, by the names of their targets.
+///
+/// # Errors
+/// As for [`compiler`].
+pub fn compiler_for_chips(names: &[&str]) -> Result<Compiler, BuildError> {
+    compiler_for(ForeignTarget { names, ..MICROCONTROLLER })?.ok_or(BuildError::NoCompiler)
+}
+
+/// The installed compiler for all of these targets; `None` if there is none.
+///
+/// # Errors
+/// [`NoCheckout`] if there is nothing that it could compile.
+pub(crate) fn compiler_for(target: ForeignTarget<'_>) -> Result<Option<Compiler>, NoCheckout> {
+    let target_directory = base_directory()?.join(target.folder);
+    let mut compiler = if target.names.iter().all(|name| rustup_has(name)) {
         Compiler {
             program: "cargo",
             version: version("rustc"),
             cargo: Command::new("cargo"),
             target_directory,
         }
-    } else if debian_has_a_compiler() {
+    } else if debian_has_a_compiler(target.linker) {
         let mut cargo = Command::new(DEBIAN_CARGO);
-        cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg("-Zbuild-std=core");
-        cargo.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
+        cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg(target.libraries);
+        for name in target.names {
+            let name = name.replace(['-', '.'], "_").to_uppercase();
+            cargo.env(format!("CARGO_TARGET_{name}_LINKER"), target.linker);
+        }
         // Two compilers cannot share a directory.
         Compiler {
             program: DEBIAN_CARGO,
@@ -49,7 +86,7 @@ pub fn compiler() -> Result<Compiler, BuildError> {
             target_directory: target_directory.join("debian"),
         }
     } else {
-        return Err(BuildError::NoCompiler);
+        return Ok(None);
     };
     // Variables set by an outer cargo are for the host.
     for (name, _) in std::env::vars_os() {
@@ -60,16 +97,19 @@ pub fn compiler() -> Result<Compiler, BuildError> {
         }
     }
     compiler.cargo.env("CARGO_TARGET_DIR", &compiler.target_directory).stdin(Stdio::null());
-    Ok(compiler)
+    Ok(Some(compiler))
 }
 
 /// A separate target directory: the caller may run under cargo, which holds a lock on the usual one.
-pub(super) fn target_directory() -> Result<PathBuf, BuildError> {
-    let base = match std::env::var_os("CARGO_TARGET_DIR") {
+pub(super) fn target_directory() -> Result<PathBuf, NoCheckout> {
+    Ok(base_directory()?.join(MICROCONTROLLER.folder))
+}
+
+fn base_directory() -> Result<PathBuf, NoCheckout> {
+    Ok(match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => std::path::absolute(directory).unwrap_or_default(),
         None => checkout()?.join("target"),
-    };
-    Ok(base.join("firmware"))
+    })
 }
 
 fn version(rustc: &str) -> String {
@@ -77,16 +117,16 @@ fn version(rustc: &str) -> String {
     output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default()
 }
 
-fn rustup_has_the_target() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+fn rustup_has(target: &str) -> bool {
+    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", target]).output();
     output.is_ok_and(|output| {
         output.status.success() && Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir()
     })
 }
 
-fn debian_has_a_compiler() -> bool {
+fn debian_has_a_compiler(linker: &str) -> bool {
     let sysroot = Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"]).output();
-    let linker = Command::new("ld.lld").arg("--version").output();
+    let linker = Command::new(linker).arg("--version").output();
     let has_source = sysroot.is_ok_and(|output| {
         let sysroot = String::from_utf8_lossy(&output.stdout).trim().to_owned();
         Path::new(&sysroot).join("lib/rustlib/src/rust/library/core").is_dir()

@@ -17,7 +17,7 @@ pub(crate) fn read(file: &str) -> String {
 /// Path and text of each document; paths start at the root of the repository.
 fn documents() -> Vec<(String, String)> {
     let mut names = vec!["README.md".to_owned(), "ARCHITECTURE.md".to_owned(), "CONTRIBUTING.md".to_owned()];
-    names.extend(["host-design/design/README.md".to_owned(), "host-design/tool/README.md".to_owned()]);
+    names.extend(["design", "page", "tool"].map(|name| format!("host-design/{name}/README.md")));
     for folder in ["docs", "docs/results"] {
         for entry in std::fs::read_dir(root().join(folder)).unwrap() {
             let name = entry.unwrap().file_name().into_string().unwrap();

@@ -34,6 +34,8 @@ mod reproduced;
 mod robust_command;
 mod serial_errors;
 mod shaken;
+mod site_bits;
+mod site_page;
 mod split_command;
 mod stepper_command;
 mod transitions_command;

@@ -16,6 +16,7 @@ use upright_tool::campaign::CampaignError;
 use upright_tool::commission::Stop;
 use upright_tool::image::BuildError;
 use upright_tool::in_the_loop::RunError;
+use upright_tool::site::SiteError;
 
 /// Why a command ends without its result, and with which exit status.
 pub(crate) struct Failure {
@@ -91,7 +92,9 @@ fn exit_status(error: &(dyn Error + 'static)) -> u8 {
         exit_status_of_a_run(error)
     } else if let Some(CampaignError::Trial { source, .. }) = error.downcast_ref() {
         if source.lacks_emulator() { 4 } else { 1 }
-    } else if let Some(BuildError::NoCompiler) = error.downcast_ref() {
+    } else if matches!(error.downcast_ref(), Some(BuildError::NoCompiler))
+        || matches!(error.downcast_ref(), Some(SiteError::NoCompiler))
+    {
         4
     } else if let Some(stop) = error.downcast_ref() {
         match stop {

@@ -20,6 +20,7 @@ mod reproduce;
 mod robust;
 mod shake;
 mod simulate;
+mod site;
 mod split;
 mod swing_up;
 mod target;
@@ -45,6 +46,7 @@ Examples:
   upright identify my.toml run.log --write new.toml   the real machine's parameters, from a log
   upright export my.toml --c controller.h       table and controller as one C header, for Arduino and others
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
+  upright site --out site                       a page that designs rigs in the browser, nothing to install
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
   upright reproduce                             the results of the paper compared with ours
 
@@ -81,6 +83,7 @@ enum UprightCommand {
     Identify(identify::IdentifyCommand),
     Import(import::ImportCommand),
     Simulate(simulate::SimulateCommand),
+    Site(site::SiteCommand),
     Twin(twin::TwinCommand),
     SwingUp(swing_up::SwingUpCommand),
     Transitions(transitions::TransitionsCommand),
@@ -105,6 +108,7 @@ fn main() -> ExitCode {
         UprightCommand::Identify(command) => command.run(),
         UprightCommand::Import(command) => command.run(),
         UprightCommand::Simulate(command) => command.run(),
+        UprightCommand::Site(command) => command.run(),
         UprightCommand::Twin(command) => command.run(),
         UprightCommand::SwingUp(command) => command.run(),
         UprightCommand::Transitions(command) => command.run(),

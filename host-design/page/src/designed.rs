@@ -1,0 +1,120 @@
+//! A design, with what a page shows of it.
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use upright::table::Law;
+use upright_design::design::{Certified, Feedback, design};
+use upright_design::rig::{PlantDescription, Rig};
+use upright_design::simulate::{Scenario, simulate};
+use upright_design::swing_up::{Stored, motions, with_motions};
+use upright_design::table::{Gains, NoTable, TableValues};
+
+use crate::refusal::PageRefusal;
+
+/// Most points of a curve that a page draws.
+const POINTS: usize = 600;
+/// Duration of the run that a page shows (s).
+const RUN_S: f64 = 8.0;
+
+/// How the closed loop is disturbed in the run that a page shows.
+#[derive(Debug, Deserialize)]
+pub(crate) struct ShownRun {
+    /// Lean of the first link at the start (rad), or offset of a model's output.
+    lean_rad: f64,
+    /// Step of the set-point at the start (m).
+    step_m: f64,
+}
+
+/// A certified design and its table.
+#[derive(Debug)]
+pub(crate) struct DeskDesign {
+    certified: Certified,
+    table: Result<TableValues, NoTable>,
+}
+
+impl DeskDesign {
+    /// Designs what `rig` asks for.
+    pub(crate) fn of(rig: &Rig) -> Result<Self, PageRefusal> {
+        let certified = design(rig)?;
+        let table = TableValues::of(rig, &certified, Gains::Sampled);
+        Ok(Self { certified, table })
+    }
+
+    /// The gain table.
+    pub(crate) fn table(&self) -> Result<&TableValues, PageRefusal> {
+        Ok(self.table.as_ref().map_err(Clone::clone)?)
+    }
+
+    /// The gain table, with the motions `stored` if they were planned for the values of this rig.
+    pub(crate) fn table_with(&self, rig: &Rig, stored: Option<&str>) -> Result<TableValues, PageRefusal> {
+        let table = self.table()?.clone();
+        let stored: Option<Stored> = stored.map(serde_json::from_str).transpose()?;
+        match stored.filter(|stored| stored.is_of(rig)) {
+            Some(stored) => Ok(with_motions(rig, table, &motions(rig, &stored)?, &[])?),
+            None => Ok(table),
+        }
+    }
+
+    /// The gains of all laws with their certificate, and a run of the firmware's controller with each.
+    pub(crate) fn gains_and_run(&self, rig: &Rig, run: &ShownRun) -> Result<Value, PageRefusal> {
+        let Certified { double, bits, .. } = &self.certified;
+        let assessments = self.certified.assess(rig)?;
+        let mut laws = Vec::new();
+        for (law, assessment) in assessments.present() {
+            let shown = match &self.table {
+                Ok(table) => Some(shown(rig, table, law, run)?),
+                Err(_) => None,
+            };
+            laws.push(json!({
+                "law": law.option(),
+                "title": law.title(),
+                "continuous": double.continuous.in_table()[law].map(gains),
+                "sampled": double.sampled.in_table()[law].map(gains),
+                "radius": assessment.rounded,
+                "rounding": assessment.largest_rounding,
+                "run": shown,
+            }));
+        }
+        Ok(json!({
+            "rig": rig.name,
+            "hash": format!("{:016x}", rig.hash()),
+            "states": rig.states(),
+            "tick_s": rig.tick.period_s,
+            "bits": bits,
+            "crc": self.table.as_ref().ok().map(|table| format!("{:08x}", table.crc())),
+            "no_table": self.table.as_ref().err().map(ToString::to_string),
+            "laws": laws,
+        }))
+    }
+
+    /// The poles of the loops of all laws, in continuous time and at the tick.
+    pub(crate) fn poles(&self, rig: &Rig) -> Result<Value, PageRefusal> {
+        let poles = self.certified.poles(rig)?;
+        let of = |law: Law| {
+            let [continuous, sampled] = poles.in_table(law);
+            json!({ "law": law.option(), "continuous": continuous, "sampled": sampled })
+        };
+        Ok(json!({ "laws": Law::ALL.map(of) }))
+    }
+}
+
+fn gains(law: &Feedback<f64>) -> Value {
+    json!({ "k": law.k.entries(), "n": law.n })
+}
+
+/// A run of the firmware's controller against the nonlinear rig.
+fn shown(rig: &Rig, table: &TableValues, law: Law, run: &ShownRun) -> Result<Value, PageRefusal> {
+    let mut scenario = Scenario { duration_s: RUN_S, step_m: run.step_m, ..Scenario::at_rest(rig, law) };
+    match &rig.plant {
+        PlantDescription::Chain(_) => scenario.start[2] = run.lean_rad,
+        PlantDescription::Model(model) => scenario.start[model.output] = run.lean_rad,
+    }
+    let (trace, summary) = simulate(rig, table, &scenario)?;
+    let samples = trace.samples();
+    let every = samples.len().div_ceil(POINTS).max(1);
+    let rows: Vec<Value> = samples
+        .step_by(every)
+        .map(|sample| json!([sample.t, sample.setpoint, sample.force, sample.state]))
+        .collect();
+    Ok(json!({ "summary": summary.to_string(), "fell": summary.fall.is_some(), "rows": rows }))
+}

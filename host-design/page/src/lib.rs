@@ -1,0 +1,23 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # Files
+//!
+//! | file | what is in it |
+//! |---|---|
+//! | `question.rs`, `refusal.rs` | what a page asks, and why there may be no answer |
+//! | `sketch.rs`, `designed.rs` | what it shows of a rig, and of its design |
+//! | `fingerprint.rs` | checksums of tables and of 100 000 ticks of the firmware, to compare machines |
+//! | `exported.rs` | the functions that a browser calls, the only ones with names of their own in the module |
+
+#![deny(unsafe_code)]
+
+mod designed;
+#[cfg(target_family = "wasm")]
+mod exported;
+mod fingerprint;
+mod question;
+mod refusal;
+mod sketch;
+
+pub use fingerprint::{Fingerprint, FingerprintError, PullRounding, TICKS};
+pub use question::Desk;

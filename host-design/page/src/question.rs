@@ -1,0 +1,154 @@
+//! What a page asks, and the answers.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use upright_design::export::c_header;
+use upright_design::rig::{Rig, RigText};
+use upright_design::table::gains_source;
+
+use crate::designed::{DeskDesign, ShownRun};
+use crate::fingerprint::{Fingerprint, PullRounding};
+use crate::refusal::PageRefusal;
+use crate::sketch;
+
+/// Name under which errors speak of the rig file; a page shows them without it.
+const FILE: &str = "rig.toml";
+
+/// A question about a rig: the text of its file, and what is wanted.
+#[derive(Debug, Deserialize)]
+struct Question {
+    #[serde(flatten)]
+    wanted: Asked,
+    /// The rig file.
+    toml: String,
+    /// The motions that are stored beside it, if there are any.
+    motions: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "ask", rename_all = "kebab-case")]
+enum Asked {
+    /// Whether the file is valid, and what it describes.
+    Check,
+    /// The text with another value of a key.
+    Set { key: String, value: String },
+    /// The gains, and the closed loop in a run of the firmware's controller.
+    Design(ShownRun),
+    /// The poles of the loops, which take as long as the gains.
+    Poles,
+    /// The gain table as Rust source, as `upright design` writes it.
+    Table,
+    /// Table and controller as a C header, as `upright export` writes it.
+    Header,
+    /// Checksums of the table and of `ticks` ticks of the firmware.
+    Fingerprint { rounding: PullRounding, ticks: u32 },
+}
+
+/// Answers questions; keeps the last design, because the next question is often about the same rig.
+#[derive(Debug, Default)]
+pub struct Desk {
+    designed: Option<(String, DeskDesign)>,
+}
+
+impl Desk {
+    /// Answers a question in JSON with an object in JSON. One that cannot be answered gives `failed`, with what to do,
+    /// and for an error in the rig file its `line` and `column`.
+    pub fn answer(&mut self, question: &str) -> String {
+        let answer = serde_json::from_str(question)
+            .map_err(PageRefusal::from)
+            .and_then(|question| self.answered(&question));
+        let answer = answer.unwrap_or_else(|refusal| {
+            let place = match &refusal {
+                PageRefusal::Rig(error) => error.place,
+                _ => None,
+            };
+            let (line, column) = (place.map(|place| place.line), place.map(|place| place.column));
+            json!({ "failed": { "why": refusal.to_string(), "line": line, "column": column } })
+        });
+        answer.to_string()
+    }
+
+    fn answered(&mut self, question: &Question) -> Result<Value, PageRefusal> {
+        let rig = Rig::from_toml(&question.toml, Path::new(FILE))?;
+        let motions = question.motions.as_deref();
+        match &question.wanted {
+            Asked::Check => Ok(sketch::of(&rig)),
+            Asked::Set { key, value } => {
+                let mut text = RigText::parse(&question.toml, Path::new(FILE))?;
+                text.set(key, value)?;
+                let text = text.to_string();
+                Rig::from_toml(&text, Path::new(FILE))?;
+                Ok(json!({ "toml": text }))
+            }
+            Asked::Design(run) => self.designed(&question.toml, &rig)?.gains_and_run(&rig, run),
+            Asked::Poles => self.designed(&question.toml, &rig)?.poles(&rig),
+            Asked::Table => {
+                let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
+                Ok(json!({ "text": gains_source(&rig, &table) }))
+            }
+            Asked::Header => {
+                let table = self.designed(&question.toml, &rig)?.table()?;
+                Ok(json!({ "text": c_header(&rig, table)? }))
+            }
+            &Asked::Fingerprint { rounding, ticks } => {
+                let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
+                Ok(json!(Fingerprint::of(&rig, &table, rounding, ticks)?))
+            }
+        }
+    }
+
+    /// The design of `rig`, whose file has the text `toml`.
+    fn designed(&mut self, toml: &str, rig: &Rig) -> Result<&DeskDesign, PageRefusal> {
+        let kept = self.designed.take().filter(|(text, _)| text == toml);
+        let designed = match kept {
+            Some((_, designed)) => designed,
+            None => DeskDesign::of(rig)?,
+        };
+        Ok(&self.designed.insert((toml.to_owned(), designed)).1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rig(name: &str) -> String {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
+        std::fs::read_to_string(file).unwrap()
+    }
+
+    fn ask(question: &Value) -> Value {
+        serde_json::from_str(&Desk::default().answer(&question.to_string())).unwrap()
+    }
+
+    #[test]
+    fn an_error_in_a_rig_file_comes_with_its_line_and_what_to_do() {
+        let toml = rig("single-quanser-ip02");
+        assert!(ask(&json!({ "ask": "check", "toml": toml }))["failed"].is_null());
+        let wrong = toml.replace("mass_kg", "mas_kg");
+        let line = wrong.lines().position(|line| line.contains("mas_kg")).unwrap() + 1;
+        let failed = &ask(&json!({ "ask": "check", "toml": wrong }))["failed"];
+        assert_eq!(failed["line"], line);
+        assert!(failed["why"].as_str().unwrap().contains("did you mean `mass_kg`"), "{failed}");
+        assert!(ask(&json!({ "ask": "guess", "toml": toml }))["failed"].is_object());
+    }
+
+    #[test]
+    fn another_weight_gives_other_gains_and_the_first_one_those_of_the_paper() {
+        let toml = rig("quadruple-paper");
+        let gains = |toml: &Value| {
+            let design = json!({ "ask": "design", "toml": toml, "lean_rad": 0.002, "step_m": 0.05 });
+            ask(&design)["laws"][0]["continuous"]["k"].clone()
+        };
+        let first = gains(&json!(toml));
+        assert!((first[0].as_f64().unwrap() - 3.162_277_66).abs() < 1e-6, "{first}");
+        let set = json!({ "ask": "set", "toml": toml, "key": "lqr.force_weight", "value": "2" });
+        let changed = ask(&set)["toml"].clone();
+        assert!(changed.as_str().unwrap().contains("force_weight = 2\n"));
+        assert_ne!(gains(&changed), first);
+        let refused = json!({ "ask": "set", "toml": toml, "key": "lqr.force_weight", "value": "-2" });
+        assert!(ask(&refused)["failed"]["why"].as_str().unwrap().contains("force_weight"));
+    }
+}

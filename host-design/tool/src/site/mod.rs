@@ -1,0 +1,20 @@
+//! The whole of it in a page: designs rigs and runs their closed loops in a browser, with nothing to install and no
+//! network.
+//!
+//! The page computes with a WebAssembly module of the crate `upright-page`, which is compiled here. Its answers have
+//! the bits of this computer's.
+//!
+//! ```
+//! let page = upright_tool::site::page(b"the module", &[]);
+//! assert!(page.contains("default-src 'none'"));
+//! ```
+
+mod error;
+mod examples;
+mod module;
+mod page;
+
+pub use error::SiteError;
+pub use examples::examples;
+pub use module::module;
+pub use page::{Example, page};

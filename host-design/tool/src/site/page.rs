@@ -1,0 +1,114 @@
+//! The page in one file: module, examples, scripts and styles are in it, so it needs no network and no server.
+
+use miniz_oxide::deflate::compress_to_vec_zlib;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::figure::{COLOURS_CSS, style_sheet};
+
+const PAGE: &str = include_str!("page/desk.html");
+const STYLE: &str = include_str!("page/desk.css");
+const WORKER: &str = include_str!("page/worker.js");
+const SCRIPTS: [&str; 4] = [
+    include_str!("page/link.js"),
+    include_str!("page/drawing.js"),
+    include_str!("page/editor.js"),
+    include_str!("page/desk.js"),
+];
+
+/// Smallest size, at the price of time.
+const COMPRESSION: u8 = 10;
+
+/// A rig from which a person can start.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Example {
+    /// Its name.
+    pub name: String,
+    /// Its rig file.
+    pub toml: String,
+}
+
+/// The page with this module and these examples.
+///
+/// Its content security policy lets it run the scripts and styles in it, which it names by their hashes, and the
+/// module; it cannot ask any computer for anything.
+pub fn page(module: &[u8], examples: &[Example]) -> String {
+    // The rules of the figures come first: the colours of the dark scheme replace theirs.
+    let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
+    let script = format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat());
+    let policy = format!(
+        "default-src 'none'; script-src '{}' 'wasm-unsafe-eval' blob:; style-src '{}'; img-src data:; \
+         worker-src blob:; base-uri 'none'; form-action 'none'",
+        source(&script),
+        source(&style)
+    );
+    let parts = [
+        ("{policy}", policy),
+        ("{style}", style),
+        ("{examples}", json(&examples)),
+        ("{worker}", json(&WORKER)),
+        ("{module}", base64(&compress_to_vec_zlib(module, COMPRESSION))),
+        ("{script}", script),
+    ];
+    let (mut page, mut rest) = (String::new(), PAGE);
+    for (mark, part) in parts {
+        // Every mark is in the page; a test checks that none is left.
+        let (before, after) = rest.split_once(mark).unwrap_or((rest, ""));
+        page += before;
+        page += &part;
+        rest = after;
+    }
+    page + rest
+}
+
+/// JSON that can stand in a page.
+fn json(value: &impl Serialize) -> String {
+    // Serialising strings into memory does not fail.
+    serde_json::to_string(value).unwrap_or_default().replace("</", "<\\/")
+}
+
+/// The hash by which a content security policy names a script or style.
+fn source(text: &str) -> String {
+    format!("sha256-{}", base64(&Sha256::digest(text)))
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let word =
+            three.iter().enumerate().fold(0, |word, (i, &byte)| word | u32::from(byte) << (16 - 8 * i));
+        for place in 0..4 {
+            let letter = char::from(LETTERS[(word >> (18 - 6 * place) & 63) as usize]);
+            text.push(if place <= three.len() { letter } else { '=' });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_have_the_letters_of_the_standard() {
+        // RFC 4648, section 10.
+        for (bytes, text) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+    }
+
+    #[test]
+    fn the_page_holds_all_of_its_parts_and_asks_for_nothing() {
+        let toml = "name = \"</script>\"".to_owned();
+        let page = page(b"module", &[Example { name: "mine".to_owned(), toml }]);
+        assert!(page.contains("default-src 'none'") && page.contains("<\\/script>"));
+        assert_eq!(page.matches("</script>").count(), 4);
+        assert!(page.trim_end().ends_with("</html>"), "a mark is missing in the page");
+        for request in ["src=\"", "@import", "fetch(", "XMLHttpRequest", "https://", "url("] {
+            assert!(!page.contains(request), "{request}");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+// The computations: questions out, answers in.
+
+const embedded = (id) => document.getElementById(id).textContent;
+
+// The module: base64 of its compressed bytes.
+async function moduleBytes() {
+  const text = atob(embedded('module').trim());
+  const packed = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+  const bytes = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
+  return new Response(bytes).arrayBuffer();
+}
+
+// A thread that computes. Of several questions that wait, only the last of each kind is asked.
+class Thread {
+  constructor(module) {
+    const address = URL.createObjectURL(new Blob([JSON.parse(embedded('worker'))], { type: 'text/javascript' }));
+    this.worker = new Worker(address);
+    this.waiting = new Map();
+    this.asked = null;
+    this.worker.onmessage = ({ data }) => {
+      const { take } = this.asked;
+      this.asked = null;
+      take(data.answer, data.ms);
+      this.next();
+    };
+    this.ready = new Promise((take) => { this.asked = { take }; });
+    this.worker.postMessage({ id: 0, module });
+  }
+
+  get isBusy() { return this.asked !== null || this.waiting.size > 0; }
+
+  // Asks; `take` is called with the answer, unless a later question of the same kind comes before it is asked.
+  ask(kind, question, take) {
+    this.waiting.delete(kind);
+    this.waiting.set(kind, { question, take });
+    this.next();
+  }
+
+  answerTo(question) {
+    return new Promise((take) => { this.ask(`${question.ask}-${performance.now()}`, question, take); });
+  }
+
+  next() {
+    if (this.asked !== null || this.waiting.size === 0) return;
+    const [kind, asked] = this.waiting.entries().next().value;
+    this.waiting.delete(kind);
+    this.asked = asked;
+    this.worker.postMessage({ id: kind, question: asked.question });
+  }
+}

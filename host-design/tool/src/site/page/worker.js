@@ -1,0 +1,33 @@
+// Answers questions with the module: its own thread, so that the page never waits.
+
+let bytes = null;
+let exported = null;
+
+async function start() {
+  ({ instance: { exports: exported } } = await WebAssembly.instantiate(bytes, {}));
+}
+
+function answered(question) {
+  const { memory, buffer, answer } = exported;
+  const text = new TextEncoder().encode(JSON.stringify(question));
+  // The memory may be another one after each call.
+  const at = buffer(text.length);
+  new Uint8Array(memory.buffer, at, text.length).set(text);
+  const length = answer();
+  const from = buffer(length);
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, from, length)));
+}
+
+onmessage = async ({ data: { id, question, module } }) => {
+  const begin = performance.now();
+  try {
+    if (module !== undefined) bytes = module;
+    if (exported === null) await start();
+    const answer = question === undefined ? {} : answered(question);
+    postMessage({ id, answer, ms: performance.now() - begin });
+  } catch (error) {
+    // A module that has stopped cannot go on: the next question starts it again.
+    exported = null;
+    postMessage({ id, answer: { failed: { why: `the computation stopped (${error.message}); change the rig`, line: null } }, ms: 0 });
+  }
+};

@@ -1,0 +1,87 @@
+//! The page's module computes the same bits as this computer.
+//!
+//! Needs Node, a compiler for WebAssembly, and minutes to compile, so the tests run only where `UPRIGHT_REQUIRE_WASM=1`
+//! is set.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use upright_page::{Desk, TICKS};
+use upright_tool::site::module;
+
+use crate::equipment::{is_required, not_exercised};
+
+/// Rigs that have no table or firmware in a browser: a model with ten states has a table on the host alone.
+const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
+
+/// All rigs of the project: name, text, stored motions.
+fn rigs() -> Vec<(String, String, Option<String>)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    let read = |file: &Path| std::fs::read_to_string(file).ok();
+    let name = |file: &Path| file.file_stem().unwrap().to_string_lossy().into_owned();
+    files
+        .iter()
+        .map(|file| (name(file), read(file).unwrap(), read(&file.with_extension("swing-up.json"))))
+        .collect()
+}
+
+/// Whether the module is wanted here; says so if not.
+pub(crate) fn is_wanted(what: &str) -> bool {
+    let is_wanted = is_required("UPRIGHT_REQUIRE_WASM");
+    if !is_wanted {
+        not_exercised(&format!("{what}: set UPRIGHT_REQUIRE_WASM=1"));
+    }
+    is_wanted
+}
+
+/// The answers of the module in Node.
+fn in_node(questions: &[Value]) -> Vec<Value> {
+    let folder = tempfile::tempdir().unwrap();
+    let (wasm, asked) = (folder.path().join("page.wasm"), folder.path().join("questions.json"));
+    std::fs::write(&wasm, module().unwrap()).unwrap();
+    std::fs::write(&asked, json!(questions).to_string()).unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/in_node.mjs");
+    let output = Command::new("node").arg(script).args([&wasm, &asked]).output().expect("Node is installed");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn tables_and_runs_of_all_rigs_have_the_same_bits_in_webassembly() {
+    if !is_wanted("WebAssembly against this computer") {
+        return;
+    }
+    let ask = |(_, toml, motions): &(String, String, Option<String>), rounding: &str, ticks: u32| json!({ "ask": "fingerprint", "toml": toml, "motions": motions, "rounding": rounding, "ticks": ticks });
+    let rigs = rigs();
+    let mut questions: Vec<Value> = rigs.iter().map(|rig| ask(rig, "as-written", TICKS)).collect();
+    let planted = questions.len();
+    questions.extend(["as-written", "fused", "other-order"].map(|rounding| ask(&rigs[0], rounding, 2000)));
+    let begin = Instant::now();
+    let there = in_node(&questions);
+    let (there_s, begin) = (begin.elapsed().as_secs_f64(), Instant::now());
+    let here = upright_design::parallel::map(0..questions.len(), |number| -> Value {
+        serde_json::from_str(&Desk::default().answer(&questions[number].to_string())).unwrap()
+    });
+    eprintln!("module and answers in {there_s:.0} s, here in {:.0} s", begin.elapsed().as_secs_f64());
+    for ((name, _, motions), (here, there)) in rigs.iter().zip(here.iter().zip(&there)) {
+        eprintln!("{name}: {there}");
+        if NO_FIRMWARE.contains(&name.as_str()) {
+            assert!(here["failed"].is_object() && there["failed"].is_object(), "{name}: {here}, {there}");
+            continue;
+        }
+        assert_eq!(here, there, "{name}");
+        assert!(there["ticks"][0].as_u64() > Some(20_000) && there["fault"].is_string(), "{name}: {there}");
+        let moves = [1, 2].map(|motion| there["ticks"][motion].as_u64() > Some(0));
+        assert_eq!(moves, [motions.is_some(); 2], "{name}: {there}");
+    }
+    // Negative control: with one operation rounded otherwise in WebAssembly, the run differs and the table does not.
+    assert_eq!(here[planted], there[planted]);
+    for other in &there[planted + 1..] {
+        assert!(other["run"] != here[planted]["run"] && other["table"] == here[planted]["table"], "{other}");
+    }
+}

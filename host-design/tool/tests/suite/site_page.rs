@@ -1,0 +1,124 @@
+//! The page that designs rigs, opened from a disk in a real browser.
+//!
+//! Runs where `UPRIGHT_REQUIRE_WASM=1` is set, and needs Chromium or Chrome.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use upright_page::Desk;
+use upright_tool::site::{examples, module, page};
+
+use crate::report_devtools::Browser;
+use crate::site_bits::is_wanted;
+
+/// Most bytes that a server sends for the page, compressed.
+const COMPRESSED: usize = 1_000_000;
+const TELEPHONE: u32 = 390;
+
+fn root() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Waits until the page has computed everything, and an expression is true.
+fn until(browser: &mut Browser, expression: &str) {
+    let begin = Instant::now();
+    while browser.value(&format!("Boolean(!upright.isBusy() && ({expression}))")) != true {
+        let told = browser.value("document.getElementById('told').textContent");
+        assert!(begin.elapsed() < Duration::from_secs(60), "never: {expression}; {told}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+fn type_in(browser: &mut Browser, toml: &str) {
+    browser.value(&format!(
+        "{{ const text = document.getElementById('toml'); text.value = {}; text.dispatchEvent(new Event('input')); }}",
+        json!(toml)
+    ));
+}
+
+/// What the command line writes into a file.
+fn written(arguments: &[&str], option: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("written");
+    let status = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).arg(option).arg(&file).output();
+    assert!(status.unwrap().status.success(), "{arguments:?}");
+    std::fs::read_to_string(file).unwrap()
+}
+
+/// The page in a folder, opened; `None` where it cannot be.
+fn opened() -> Option<(Browser, tempfile::TempDir)> {
+    let what = "the page that designs rigs";
+    let mut browser = is_wanted(what).then(|| Browser::for_test_of(what)).flatten()?;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("index.html");
+    let text = page(&module().unwrap(), &examples(&root().join("rigs")).unwrap());
+    std::fs::write(&file, &text).unwrap();
+    let compressed = miniz_oxide::deflate::compress_to_vec(text.as_bytes(), 9).len();
+    eprintln!("the page has {} bytes, {compressed} compressed", text.len());
+    assert!(compressed < COMPRESSED, "{compressed} bytes");
+    let begin = Instant::now();
+    browser.open(&file, 1280, "light", "screen");
+    until(&mut browser, "upright.desk.design && upright.desk.poles");
+    eprintln!("gains and poles of four links after {:.2} s", begin.elapsed().as_secs_f64());
+    Some((browser, folder))
+}
+
+#[test]
+fn a_rig_is_designed_and_exported_in_the_page_as_on_the_command_line() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    let gains = browser.value("document.getElementById('gains').textContent");
+    assert!(gains.as_str().unwrap().contains("3.16228  3.68443  −14.6001  −5.75422"), "{gains}");
+    let rig = root().join("rigs/quadruple-paper.toml");
+    let name = rig.to_str().unwrap();
+    assert_eq!(browser.value("upright.exported('table')"), written(&["design", name], "--out"));
+    assert_eq!(browser.value("upright.exported('header')"), written(&["export", name], "--c"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+
+    // The browser computes the bits of this computer.
+    let single = std::fs::read_to_string(root().join("rigs/single-quanser-ip02.toml")).unwrap();
+    let question = json!({ "ask": "fingerprint", "toml": single, "rounding": "as-written", "ticks": 20_000 });
+    let here: Value = serde_json::from_str(&Desk::default().answer(&question.to_string())).unwrap();
+    assert_eq!(browser.value(&format!("upright.ask({question})")), here);
+    // Negative control: the policy keeps the page from asking anybody.
+    browser.value("fetch('data:,hello').catch(() => 0)");
+    assert!(browser.errors().iter().any(|error| error.contains("Content Security Policy")));
+}
+
+#[test]
+fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    let toml = std::fs::read_to_string(root().join("rigs/quadruple-paper.toml")).unwrap();
+    let wrong = toml.replace("force_weight", "force_wait");
+    let line = wrong.lines().position(|line| line.starts_with("force_wait")).unwrap() + 1;
+    type_in(&mut browser, &wrong);
+    until(&mut browser, "!document.getElementById('problem').hidden");
+    let problem = browser.value("document.getElementById('problem').textContent");
+    assert!(problem.as_str().unwrap().starts_with(&format!("line {line}: ")), "{problem}");
+    assert_eq!(browser.value("document.querySelector('#lines b').textContent"), line.to_string());
+    type_in(&mut browser, &toml.replace("force_weight = 1\n", "force_weight = 4\n"));
+    let first_gain = "upright.desk.design.laws[0].continuous.k[0]";
+    until(&mut browser, &format!("document.getElementById('problem').hidden && {first_gain} < 2"));
+
+    // A weight that is moved changes text and gains.
+    browser.value(
+        "{ const weight = document.getElementById('weight-lqr.force_weight'); weight.value = 0; \
+         weight.dispatchEvent(new Event('input')); }",
+    );
+    until(&mut browser, &format!("Math.abs({first_gain} - 3.16228) < 1e-5"));
+    assert_eq!(browser.value("document.getElementById('toml').value"), toml);
+
+    // The address holds the rig, behind the mark that is never sent; the page also fits on a telephone.
+    browser.value("document.getElementById('link').click()");
+    let address = browser.value("location.href");
+    assert!(address.as_str().unwrap().contains("#rig="));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+    browser.open_address("about:blank", TELEPHONE, "dark", "screen");
+    browser.open_address(address.as_str().unwrap(), TELEPHONE, "dark", "screen");
+    until(&mut browser, "upright.desk.design");
+    assert_eq!(browser.value("document.getElementById('toml').value"), toml);
+    let width = browser.value("document.documentElement.scrollWidth").as_u64();
+    assert!(width.is_some_and(|width| width <= u64::from(TELEPHONE)), "it scrolls sideways: {width:?}");
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
