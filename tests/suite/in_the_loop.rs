@@ -43,7 +43,7 @@ fn with_stored_motions(name: &'static str, others: &[&str]) -> (Rig, TableValues
 }
 
 /// Step and tilt with each law, with or without disturbances.
-fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
+pub(crate) fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     let mut scenarios = Vec::new();
     for (name, law) in Law::ALL.map(|law| (law.option(), law)) {
         let mut rest = Scenario { duration_s: 1.0, counter_start: 65_000, ..Scenario::at_rest(rig, law) };

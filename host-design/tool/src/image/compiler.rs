@@ -11,26 +11,22 @@ use crate::project::checkout;
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// A target, and what Debian's compiler needs for it.
+/// Targets that are compiled together, and what Debian's compiler needs for them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ForeignTarget {
-    /// Its name.
-    pub(crate) name: &'static str,
+pub(crate) struct ForeignTarget<'a> {
+    /// Their names.
+    pub(crate) names: &'a [&'a str],
     /// Folder for what is built, in the target directory.
     pub(crate) folder: &'static str,
     /// The standard libraries that Debian's compiler builds from source.
     pub(crate) libraries: &'static str,
-    /// Its linker, and the variable that names it to cargo.
-    pub(crate) linker: [&'static str; 2],
+    /// Their linker.
+    pub(crate) linker: &'static str,
 }
 
 /// The microcontroller.
-const MICROCONTROLLER: ForeignTarget = ForeignTarget {
-    name: TARGET,
-    folder: "firmware",
-    libraries: "-Zbuild-std=core",
-    linker: ["CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld"],
-};
+const MICROCONTROLLER: ForeignTarget<'static> =
+    ForeignTarget { names: &[TARGET], folder: "firmware", libraries: "-Zbuild-std=core", linker: "ld.lld" };
 
 /// A `cargo` that compiles for another target.
 #[derive(Debug)]
@@ -54,23 +50,34 @@ pub fn compiler() -> Result<Compiler, BuildError> {
     compiler_for(MICROCONTROLLER)?.ok_or(BuildError::NoCompiler)
 }
 
-/// The installed compiler for a target; `None` if there is none.
+/// The compiler for all of these microcontrollers that is installed, by the names of their targets.
+///
+/// # Errors
+/// As for [`compiler`].
+pub fn compiler_for_chips(names: &[&str]) -> Result<Compiler, BuildError> {
+    compiler_for(ForeignTarget { names, ..MICROCONTROLLER })?.ok_or(BuildError::NoCompiler)
+}
+
+/// The installed compiler for all of these targets; `None` if there is none.
 ///
 /// # Errors
 /// [`NoCheckout`] if there is nothing that it could compile.
-pub(crate) fn compiler_for(target: ForeignTarget) -> Result<Option<Compiler>, NoCheckout> {
+pub(crate) fn compiler_for(target: ForeignTarget<'_>) -> Result<Option<Compiler>, NoCheckout> {
     let target_directory = base_directory()?.join(target.folder);
-    let mut compiler = if rustup_has(target.name) {
+    let mut compiler = if target.names.iter().all(|name| rustup_has(name)) {
         Compiler {
             program: "cargo",
             version: version("rustc"),
             cargo: Command::new("cargo"),
             target_directory,
         }
-    } else if debian_has_a_compiler(target.linker[1]) {
+    } else if debian_has_a_compiler(target.linker) {
         let mut cargo = Command::new(DEBIAN_CARGO);
         cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg(target.libraries);
-        cargo.env(target.linker[0], target.linker[1]);
+        for name in target.names {
+            let name = name.replace(['-', '.'], "_").to_uppercase();
+            cargo.env(format!("CARGO_TARGET_{name}_LINKER"), target.linker);
+        }
         // Two compilers cannot share a directory.
         Compiler {
             program: DEBIAN_CARGO,

@@ -21,7 +21,7 @@ mod stack;
 pub use board::{BoardName, NoBoard};
 pub use build::{ImageKind, PROFILE, build, build_for};
 pub use checksum::{file_hash, flash_checksum};
-pub use compiler::{Compiler, compiler};
+pub use compiler::{Compiler, compiler, compiler_for_chips};
 pub(crate) use compiler::{ForeignTarget, compiler_for};
 pub use elf::{ElfError, LinkedImage};
 pub use error::{BuildError, TARGET};

@@ -4,11 +4,11 @@ use super::error::{SiteError, TARGET};
 use crate::image::{Compiler, ForeignTarget, compiler_for};
 use crate::project::checkout;
 
-const BROWSER: ForeignTarget = ForeignTarget {
-    name: TARGET,
+const BROWSER: ForeignTarget<'static> = ForeignTarget {
+    names: &[TARGET],
     folder: "page",
     libraries: "-Zbuild-std=std,panic_abort",
-    linker: ["CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld"],
+    linker: "wasm-ld",
 };
 
 /// Name of the module's crate, and the cargo profile that it is compiled with.
