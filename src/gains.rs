@@ -150,9 +150,9 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Thresholds at which the supervisor takes encoders and motor to be at fault.
     thresholds: Thresholds {
         // Largest plausible innovation of each sensor (m or rad).
-        innovation: [5.810177e-5, 0.003990035, 0.0042185974, 0.004008325, 0.0039284667],
+        innovation: [0.000106374544, 0.010815588, 0.010789008, 0.009300967, 0.0072794915],
         // Largest predicted motion of each sensor while its counter stands still (m or rad).
-        frozen: [0.00010278882, 0.0052355444, 0.0066623194, 0.0053651608, 0.0047674673],
+        frozen: [0.00024372195, 0.013117851, 0.017170524, 0.010777798, 0.007815738],
         // Model and thresholds of the motor test.
         motor: MotorTest {
             // a_pp, a_pv, a_vp, a_vv over one tick, the observer's correction included.
@@ -162,11 +162,11 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             // Share of the force that may be missing.
             ratio: 0.5,
             // Least sum of p² for a verdict (m²).
-            energy: 9.255121e-9,
+            energy: 1.2662925e-7,
         },
     },
     // CRC-32 of all values above.
-    crc: 0x8e79_3735,
+    crc: 0x467f_f796,
 };
 
 /// This table has no swing-up.

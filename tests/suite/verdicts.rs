@@ -3,8 +3,8 @@
 use crate::published::{rig, rig_and_table, rig_path};
 use upright::table::Law;
 use upright_design::harness::{record, with_firmware};
+use upright_design::parallel;
 use upright_design::rig::{PerJoint, Rig};
-use upright_design::simulate::FallKind;
 use upright_design::swing_up::{Stored, SwingUpError, judge};
 use upright_design::table::TableValues;
 use upright_design::verify::{
@@ -13,13 +13,24 @@ use upright_design::verify::{
 
 /// A size that is printed may differ by this share from the one at which the whole firmware turns the motor off.
 const TOLERANCE: f64 = 0.2;
+/// Some rows of each rig: all of them take half an hour.
+const SAMPLE: [(&str, Law, &str); 8] = [
+    ("quadruple-paper", Law::Lqr, "cart_friction_n"),
+    ("quadruple-paper", Law::PolePlacement, "homing_error_rad"),
+    ("quadruple-paper", Law::Lqr, "driver_lag_s"),
+    ("quadruple-paper", Law::PolePlacement, "backlash_m"),
+    ("quadruple-paper", Law::Lqr, "rail_tilt_rad"),
+    ("triple-glueck-eder-kugi", Law::PolePlacement, "joint_friction_n_m"),
+    ("double-quanser-dbpen", Law::Lqr, "eccentricity_rad"),
+    ("single-quanser-ip02", Law::PolePlacement, "rail_tilt_rad"),
+];
 
 fn imperfection(key: &str) -> &'static Imperfection {
     IMPERFECTIONS.iter().find(|one| one.key == key).unwrap()
 }
 
-fn found(law: Law, key: &str) -> Survival {
-    let (rig, table) = rig_and_table("quadruple-paper");
+fn found(name: &'static str, law: Law, key: &str) -> Survival {
+    let (rig, table) = rig_and_table(name);
     survival(rig, table, law, &ImperfectionSettings::of(rig), imperfection(key)).unwrap()
 }
 
@@ -32,50 +43,51 @@ fn stays_on(machine: &Rig, table: &TableValues, law: Law) -> bool {
     })
 }
 
-/// The machine with this imperfection alone.
-fn machine(key: &str, size: f64) -> Rig {
-    let (rig, _) = rig_and_table("quadruple-paper");
-    imperfection(key).on(rig, size)
-}
-
-/// The size from which the whole firmware turns the motor off, by bisection to within a twentieth.
-fn turned_off_at(law: Law, key: &str, near: f64) -> f64 {
-    let (_, table) = rig_and_table("quadruple-paper");
-    let (mut held, mut lost) = (near / 3.0, 3.0 * near);
-    while lost > 1.05 * held {
-        let middle = (held * lost).sqrt();
-        if stays_on(&machine(key, middle), table, law) { held = middle } else { lost = middle }
+/// Where the whole firmware does not do what is printed for this row: it goes off at a clearly smaller size, or stays
+/// on with a clearly larger one.
+fn disagreement(name: &'static str, law: Law, key: &str) -> Option<String> {
+    let (rig, table) = rig_and_table(name);
+    let found = found(name, law, key);
+    // An imperfection that the largest one tried does not turn off has no size to compare.
+    let printed = found.turned_off_at?;
+    // The harder one of both bristle lengths is the row's.
+    let bristle = found.bristles.iter().find(|one| one.turned_off_at == Some(printed));
+    let machine = |size: f64| {
+        let mut machine = imperfection(key).on(rig, size);
+        if let Some(bristle) = bristle {
+            machine.reality.friction.presliding_rad = PerJoint::all(bristle.bristle_rad);
+        }
+        machine
+    };
+    let on = |size: f64| stays_on(&machine(size), table, law);
+    let (less, more) = (printed / (1.0 + TOLERANCE), printed * (1.0 + TOLERANCE));
+    let row = format!("{name} {law} {key}: off at {printed:.3e} ({:?})", found.ended_by);
+    println!("{row}");
+    if !on(less) {
+        return Some(format!("{row}, but the firmware is off with {less:.3e}"));
     }
-    lost
+    // A latency beyond the tick cannot be simulated.
+    let is_possible = key != "latency_s" || more < rig.tick.period_s;
+    (is_possible && on(more)).then(|| format!("{row}, but the firmware is on with {more:.3e}"))
 }
 
 #[test]
 fn the_size_that_verify_prints_is_the_one_at_which_the_whole_firmware_turns_the_motor_off() {
-    for key in ["cart_friction_n", "homing_error_rad", "backlash_m", "rail_tilt_rad", "driver_lag_s"] {
-        for law in Law::ALL {
-            let found = found(law, key);
-            let printed = found.turned_off_at.unwrap();
-            let measured = turned_off_at(law, key, printed);
-            println!(
-                "{law} {key}: {printed:.3e} {measured:.3e} {:?} falls {:?}",
-                found.ended_by, found.falls_at
-            );
-            assert!((printed / measured - 1.0).abs() < TOLERANCE, "{law} {key}: {printed} {measured}");
-            assert!(matches!(found.ended_by, Some(FallKind::MotorOff(_))), "{law} {key}: {found:?}");
-        }
-    }
+    let wrong = parallel::map(SAMPLE.to_vec(), |(name, law, key)| disagreement(name, law, key));
+    let wrong: Vec<String> = wrong.into_iter().flatten().collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 /// Negative control: without detection the firmware does not agree.
 #[test]
 fn a_firmware_without_detection_stays_on_with_a_size_at_which_verify_says_that_it_does_not() {
-    let (_, table) = rig_and_table("quadruple-paper");
+    let (rig, table) = rig_and_table("quadruple-paper");
     let mut without = table.clone();
     without.thresholds.innovation.iter_mut().for_each(|threshold| *threshold = f32::MAX);
     without.thresholds.frozen.iter_mut().for_each(|threshold| *threshold = f32::MAX);
     without.thresholds.motor.energy = f32::MAX;
-    let printed = found(Law::Lqr, "cart_friction_n").turned_off_at.unwrap();
-    let machine = machine("cart_friction_n", (1.0 + TOLERANCE) * printed);
+    let printed = found("quadruple-paper", Law::Lqr, "cart_friction_n").turned_off_at.unwrap();
+    let machine = imperfection("cart_friction_n").on(rig, (1.0 + TOLERANCE) * printed);
     assert!(!stays_on(&machine, table, Law::Lqr));
     assert!(stays_on(&machine, &without, Law::Lqr));
 }
@@ -83,16 +95,15 @@ fn a_firmware_without_detection_stays_on_with_a_size_at_which_verify_says_that_i
 #[test]
 fn a_swing_up_that_detection_ends_names_the_fault_and_the_tolerances_that_cure_it() {
     let mut rig = rig("double-quanser-dbpen");
-    rig.reality.friction.cart_friction_n = 0.5;
+    // More than twice what fault detection tolerates of this rig in any case.
+    rig.reality.friction.cart_friction_n = 1.2;
     rig.reality.friction.joint_friction_n_m = PerJoint::all(5e-4);
     let stored = Stored::beside(&rig_path("double-quanser-dbpen")).unwrap();
     let Err(SwingUpError::NotRobust { arrived, help, .. }) = judge(&rig, &stored, &|_| ()) else {
         panic!("enough arrive");
     };
-    assert_eq!(arrived, 64);
+    assert_eq!(arrived, 116);
     let (fault, cure) = help.split_once("; ").unwrap();
-    assert!(fault.starts_with("fault motor ended 1"), "{help}");
-    let cured =
-        "188 of 200 arrive with robust.joint_friction_n_m = 0.0005 and robust.cart_friction_n = 0.5; ";
-    assert!(cure.starts_with(cured), "{help}");
+    assert!(fault.starts_with("fault motor ended 40"), "{help}");
+    assert!(cure.starts_with("156 of 200 arrive with robust.cart_friction_n = 1.2; "), "{help}");
 }

@@ -50,7 +50,7 @@ pub struct MotorDesign {
 ///   standard deviation is `√(S_00 / Σ p²)`; there is no verdict until that is at most 1/g of the share that may be
 ///   missing.
 ///
-/// With `[robust]`, each is wider by the largest error `B` that the stated friction and wrong zeros can cause, the
+/// For a chain, each is wider by the largest error `B` that the tolerated friction and wrong zeros can cause, the
 /// first also by a factor for wrong masses (see the source of `tolerated`). In the motor's test,
 /// `Σ e p <= B √(M Σ p²)`.
 pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<DetectionDesign> {

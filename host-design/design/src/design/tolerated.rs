@@ -1,4 +1,4 @@
-//! Bounds on the innovation of a machine that is within the tolerances of `[robust]`.
+//! Bounds on the innovation of a machine that is within the tolerances of the rig.
 
 use super::zero_order_hold::zero_order_hold;
 use super::{Design, Kalman, continuous_plant};
@@ -33,7 +33,7 @@ pub(super) struct Tolerated {
 }
 
 impl Tolerated {
-    /// For the tolerances of `rig`, all 0 without `[robust]`; each tick keeps `keep` of the sum of the corrections.
+    /// For what detection tolerates of `rig`, all 0 for a model; each tick keeps `keep` of the sum of the corrections.
     /// None if the plant has no linear model.
     pub(super) fn of(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>, keep: f64) -> Option<Self> {
         let sensors = kalman.steps.entries().len();
@@ -43,7 +43,7 @@ impl Tolerated {
             lighter: 1.0,
             mismatch: 1.0,
         };
-        let Some(tolerances) = rig.robust.as_ref().filter(|_| rig.chain().is_some()) else {
+        let Some(tolerances) = rig.detection_tolerances() else {
             return Some(bounds);
         };
         let wrong = 0.01 * tolerances.mass_percent;

@@ -49,6 +49,10 @@ impl Rig {
         if let Some(tolerances) = &self.robust {
             page.section(&ROBUST, tolerances);
         }
+        if let Some(tolerances) = self.detection_tolerances() {
+            page.heading("tolerated by fault detection");
+            page.rows(&ROBUST, &tolerances);
+        }
         if let Some(rules) = &self.swing_up {
             page.section(&SWING_UP, rules);
         }

@@ -33,6 +33,7 @@ mod read;
 mod rule;
 mod sections;
 mod sensors;
+mod typical;
 mod unusual;
 mod value;
 

@@ -5,10 +5,10 @@ use upright::table::Law;
 
 use crate::plant::absolute_angles;
 use crate::rig::{PerJoint, Rig, Tolerances};
-use crate::simulate::{Scenario, SimulationError, run};
+use crate::simulate::{FallKind, Scenario, SimulationError, run};
 use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
-use crate::verify::{CornerSettings, Disturbance, VerifyError, corners, leaning, scenario};
+use crate::verify::{CornerSettings, Disturbance, VerifyError, corners, disturbed, leaning};
 
 /// Shares of the tolerances that are tried. A loop may survive with much friction and fall with little.
 pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
@@ -40,8 +40,10 @@ pub struct Runs {
     pub share: f64,
     /// Number of runs.
     pub runs: u64,
-    /// How many survived to the end within the supervisor's limits of angle and rail.
+    /// In how many the firmware kept the motor on to the end.
     pub survived: u64,
+    /// How the first of the others ended.
+    pub ended_by: Option<FallKind>,
     /// Force on the cart (N rms), over the runs that survived, after the first tenth.
     pub force_rms_n: f64,
     /// Largest angle of a link from the vertical in the runs that survived (rad).
@@ -69,8 +71,9 @@ impl Judgement {
     }
 }
 
-/// Runs the loop of `table` on machines with shares of the tolerances, and at every combination of mass errors. The
-/// machines with each share are a part of `study`; a shard leaves the combinations of mass errors to the merge.
+/// Runs the loop of `table`, with the firmware's limits and fault detection, on machines with shares of the tolerances,
+/// and at every combination of mass errors. The machines with each share are a part of `study`; a shard leaves the
+/// combinations of mass errors to the merge.
 ///
 /// # Errors
 /// [`VerifyError`] if the runs cannot be started.
@@ -119,7 +122,7 @@ pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
 /// Result of one run.
 #[derive(Serialize, Deserialize)]
 pub(super) struct JudgedRun {
-    pub(super) survives: bool,
+    pub(super) ended_by: Option<FallKind>,
     /// Time of the last tick (s): that of a fall.
     #[serde(skip)]
     pub(super) survived_s: f64,
@@ -142,13 +145,10 @@ pub(super) fn one(
 ) -> Result<JudgedRun, SimulationError> {
     let scenario = Scenario {
         start: leaning(machine, &vec![LEAN_RAD; machine.links()]),
-        force_noise_n: settings.disturbance.force_n,
-        torque_noise_n_m: settings.disturbance.torque_n_m,
-        seed,
-        ..scenario(machine, law, settings.duration_s)
+        ..disturbed(machine, law, settings.duration_s, &settings.disturbance, seed)
     };
     let mut outcome = JudgedRun {
-        survives: false,
+        ended_by: None,
         survived_s: 0.0,
         ticks: 0.0,
         force: 0.0,
@@ -165,21 +165,18 @@ pub(super) fn one(
             outcome.force += sample.force * sample.force;
         }
     })?;
-    let limits = &table.limits;
-    let [low, high] = limits.rail_m.map(f64::from);
-    outcome.survives = fall.is_none()
-        && outcome.angle_rad <= f64::from(limits.angle_rad)
-        && outcome.position_m <= high.min(-low);
+    outcome.ended_by = fall.map(|fall| fall.kind);
     Ok(outcome)
 }
 
 fn summary(share: f64, all: &[JudgedRun]) -> Runs {
-    let survived = || all.iter().filter(|outcome| outcome.survives);
+    let survived = || all.iter().filter(|outcome| outcome.ended_by.is_none());
     let ticks: f64 = survived().map(|outcome| outcome.ticks).sum();
     Runs {
         share,
         runs: all.len() as u64,
         survived: survived().count() as u64,
+        ended_by: all.iter().find_map(|outcome| outcome.ended_by),
         force_rms_n: (survived().map(|outcome| outcome.force).sum::<f64>() / ticks.max(1.0)).sqrt(),
         peak_angle_rad: survived().map(|outcome| outcome.angle_rad).fold(0.0, f64::max),
         peak_position_m: survived().map(|outcome| outcome.position_m).fold(0.0, f64::max),

@@ -192,16 +192,16 @@ impl<'a> CandidateLoops<'a> {
     /// Short runs with each share of `scale` times the tolerances, up to the first that falls.
     pub(super) fn runs(&self, at: At, scale: f64) -> Result<LoopTrial, RobustError> {
         let mut trial = LoopTrial { is_stable: true, survived_s: 0.0, holds: false };
-        let rig = self.rig_of(at);
+        let tolerances = self.tolerances.scaled(scale);
+        let rig = Rig { robust: Some(tolerances.clone()), ..self.rig_of(at) };
         let Some(table) = self.trial_table(&rig, at) else { return Ok(trial) };
         let settings = JudgeSettings { duration_s: SHORT_RUN_S, ..*self.settings };
-        let tolerances = self.tolerances.scaled(scale);
         // The largest share first: most candidates fall there, and early.
         for share in SHARES.into_iter().rev() {
             let real = machine(&rig, &tolerances, share);
             let outcome = one(&real, &table, self.pools[at[0]].law, &settings, 1)?;
             trial.survived_s += outcome.survived_s;
-            if !outcome.survives {
+            if outcome.ended_by.is_some() {
                 return Ok(trial);
             }
         }

@@ -69,6 +69,8 @@ pub fn choose(
     if let Some((what, value, accepts)) = tolerances.too_large(rig.tick.period_s) {
         return Err(VerifyError::Setting { what, value, accepts }.into());
     }
+    // Fault detection expects what is judged.
+    let rig = &Rig { robust: Some(tolerances.clone()), ..rig.clone() };
     let own = design(rig)?;
     let loops = CandidateLoops::of(rig, tolerances, settings, &own, progress)?;
     let choice = Search { loops: &loops, tolerances, settings }.choice(progress)?;

@@ -118,16 +118,16 @@ impl Remedy {
         Some(())
     }
 
-    /// States friction and wrong zeros of `[reality]` in `[robust]`, where they widen the thresholds of fault
-    /// detection; returns whether that changes anything.
+    /// States friction and wrong zeros of `[reality]` in `[robust]` if they are more than fault detection tolerates;
+    /// returns whether that changes anything.
     pub(super) fn tolerate_reality(&mut self) -> bool {
-        let Some(links) = self.rig.chain().map(|chain| chain.links.len()) else { return false };
+        let Some(mut tolerances) = self.rig.detection_tolerances() else { return false };
+        let links = self.rig.links();
         let reality = &self.rig.reality;
         let largest = |each: &PerJoint| (0..links).map(|joint| each.of(joint).abs()).fold(0.0, f64::max);
         let joint_n_m = largest(&reality.friction.joint_friction_n_m);
         let zero_rad = largest(&reality.sensors.homing_error_rad);
         let cart_n = reality.friction.cart_friction_n;
-        let mut tolerances = self.rig.robust.clone().unwrap_or_default();
         let stated = [
             ("joint_friction_n_m", &mut tolerances.joint_friction_n_m, joint_n_m),
             ("cart_friction_n", &mut tolerances.cart_friction_n, cart_n),

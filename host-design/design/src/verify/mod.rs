@@ -41,7 +41,7 @@ mod trial;
 pub(crate) use covariance::stationary;
 pub(crate) use error::chain;
 pub(crate) use loop_model::{Numbers, radius};
-pub(crate) use trial::{leaning, scenario};
+pub(crate) use trial::{disturbed, leaning};
 
 pub use attraction::{
     Attraction, AttractionSettings, Edge, Map, MapAxis, Tilt, WorstTilt, attraction, attraction_map,

@@ -25,6 +25,41 @@ fn half_a_minute_of_nominal_balancing_of_every_rig_raises_no_alarm() {
     }
 }
 
+/// Joint friction (N·m), cart friction (N) and wrong zeros (rad) that docs/reality.md estimates for a rig.
+fn typical(name: &str, [joint_n_m, cart_n, zero_rad]: [f64; 3]) -> Rig {
+    let mut typical = rig(name);
+    typical.reality.friction.joint_friction_n_m = PerJoint::all(joint_n_m);
+    typical.reality.friction.cart_friction_n = cart_n;
+    typical.reality.sensors.homing_error_rad = PerJoint::all(zero_rad);
+    typical
+}
+
+#[test]
+fn half_a_minute_of_balancing_of_every_typical_machine_raises_no_alarm() {
+    let both = &Law::ALL[..];
+    let machines = [
+        ("single-quanser-ip02", [5e-4, 0.5, 7e-4], both),
+        ("double-quanser-dbpen", [5e-4, 0.5, 3e-3], both),
+        ("triple-glueck-eder-kugi", [1e-3, 2.0, 1e-3], both),
+        // The paper's LQR does not survive this friction of the joints, whatever the firmware tolerates.
+        ("quadruple-paper", [1e-4, 0.2, 1e-3], &[Law::PolePlacement]),
+    ];
+    let of_rig = |(name, reality, laws): (&'static str, [f64; 3], &'static [Law])| {
+        laws.iter().map(move |&law| (name, reality, law))
+    };
+    let runs: Vec<_> = machines.into_iter().flat_map(of_rig).collect();
+    let found = parallel::map(runs, |(name, reality, law)| {
+        (name, law, nominal(&typical(name, reality), law, 1, 30.0 / 3600.0))
+    });
+    for (name, law, found) in found {
+        assert_eq!((&found.fault, found.rejected), (&None, 0), "{name} {law:?}: {found:?}");
+    }
+    // Negative control: four times the friction of the cart.
+    let rough = typical("quadruple-paper", [0.0, 0.8, 0.0]);
+    let found = nominal(&rough, Law::PolePlacement, 1, 30.0 / 3600.0);
+    assert_eq!(found.fault, Some(Fault::Motor.to_string()), "{found:?}");
+}
+
 #[test]
 fn twenty_times_the_disturbance_is_an_alarm() {
     // Negative control: larger disturbances do raise an alarm.
@@ -88,20 +123,25 @@ fn friction_that_the_file_tolerates_is_no_alarm_and_without_the_tolerance_it_is(
     sticking.reality.friction.joint_friction_n_m = PerJoint::all(3e-2);
     let found = nominal(&sticking, Law::Lqr, 1, 20.0 / 3600.0);
     assert_eq!((&found.fault, found.rejected), (&None, 0), "{found:?}");
-    // Negative control: the same machine, with thresholds for the exact model.
+    // Negative control: the same machine, with thresholds for a typical one.
     sticking.robust = None;
     let found = nominal(&sticking, Law::Lqr, 1, 20.0 / 3600.0);
     assert_eq!(found.fault, Some(Fault::Encoder.to_string()), "{found:?}");
 }
 
 #[test]
-fn thresholds_follow_from_the_tolerances() {
-    let exact = table(&rig("quadruple-paper")).thresholds;
-    assert_eq!(table(&tolerating("quadruple-paper", 0.0, 0.0)).thresholds, exact);
-    let wider = table(&tolerating("quadruple-paper", 5.0, 5e-5)).thresholds;
+fn thresholds_follow_from_the_tolerances_and_are_at_least_those_of_a_typical_machine() {
+    let typical = table(&rig("quadruple-paper")).thresholds;
+    // Less than typical changes nothing.
+    assert_eq!(table(&tolerating("quadruple-paper", 1.0, 1e-5)).thresholds, typical);
+    let wider = table(&tolerating("quadruple-paper", 10.0, 5e-4)).thresholds;
     let by =
-        |wide: &[f32], exact: &[f32]| wide.iter().zip(exact).take(5).map(|(a, b)| a / b).fold(0.0, f32::max);
-    let found = [by(&wider.innovation, &exact.innovation), by(&wider.frozen, &exact.frozen)];
-    println!("wider by {found:?}, energy by {}", wider.motor.energy / exact.motor.energy);
-    assert!(found.iter().all(|by| (1.05..4.0).contains(by)), "{found:?}");
+        |wide: &[f32], least: &[f32]| wide.iter().zip(least).take(5).map(|(a, b)| a / b).fold(0.0, f32::max);
+    let found = [by(&wider.innovation, &typical.innovation), by(&wider.frozen, &typical.frozen)];
+    println!("wider by {found:?}, energy by {}", wider.motor.energy / typical.motor.energy);
+    assert!(found.iter().all(|by| (1.01..4.0).contains(by)), "{found:?}");
+    // By hand: link 4 carries least, 0.1 kg · 9.81 m/s² · 0.05 m; 0.5 kg are on the rail.
+    let tolerances = rig("quadruple-paper").detection_tolerances().unwrap();
+    assert!((tolerances.joint_friction_n_m - 0.003 * 0.04905).abs() < 1e-9, "{tolerances:?}");
+    assert!((tolerances.cart_friction_n - 0.05 * 4.905).abs() < 1e-9, "{tolerances:?}");
 }

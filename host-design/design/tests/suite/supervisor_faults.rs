@@ -189,7 +189,8 @@ fn a_frozen_encoder_is_found_long_before_a_link_leaves_its_limit() {
 
 #[test]
 fn a_jump_is_found_in_the_third_tick_and_named_with_its_sensor() {
-    for counts in [5, -400] {
+    // 15 counts are about twice the widest threshold.
+    for counts in [15, -400] {
         of_all(
             |sensors| (0..sensors).map(|sensor| Defect::Jump(sensor, counts)).collect(),
             1100,

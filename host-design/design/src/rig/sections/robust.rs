@@ -12,8 +12,8 @@ pub(crate) static ROBUST: Section = Section {
     name: "robust",
     title: "[robust]",
     meaning: "tolerances that `upright robust` chooses weights, far poles and joint noise for, not with [model]; changes \
-              no gain by itself, but widens the thresholds of fault detection",
-    absent: Absent::Follows("no tolerances"),
+              no gain by itself, but fault detection tolerates as much, and at least a typical machine",
+    absent: Absent::Follows("fault detection tolerates a typical machine"),
     keys: &[Tolerances::KEYS],
 };
 
@@ -50,6 +50,17 @@ impl Tolerances {
             cart_friction_n: scale * self.cart_friction_n,
             homing_error_rad: scale * self.homing_error_rad,
             latency_s: scale * self.latency_s,
+        }
+    }
+
+    /// The larger one of each tolerance and that of `other`.
+    pub fn at_least(&self, other: &Self) -> Self {
+        Self {
+            mass_percent: self.mass_percent.max(other.mass_percent),
+            joint_friction_n_m: self.joint_friction_n_m.max(other.joint_friction_n_m),
+            cart_friction_n: self.cart_friction_n.max(other.cart_friction_n),
+            homing_error_rad: self.homing_error_rad.max(other.homing_error_rad),
+            latency_s: self.latency_s.max(other.latency_s),
         }
     }
 

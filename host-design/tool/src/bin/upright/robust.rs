@@ -126,6 +126,8 @@ impl RobustCommand {
 
     /// Judges the numbers of the file as they are.
     fn judge(&self, rig: &Rig, tolerances: &Tolerances, settings: &JudgeSettings) -> Result<(), Failure> {
+        // Fault detection expects what is judged.
+        let rig = &Rig { robust: Some(tolerances.clone()), ..rig.clone() };
         let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
         let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
         let options = json!({ "tolerances": tolerances, "settings": settings });

@@ -68,9 +68,9 @@ fn write_choice(out: &mut String, choice: &Choice) -> core::fmt::Result {
 }
 
 fn write_judgement(out: &mut String, judgement: &Judgement) -> core::fmt::Result {
-    let head = ["share", "survive", "force, N rms", "angle, mrad", "cart, mm"];
-    let row = |[share, survived, force, angle, cart]: [&str; 5]| {
-        format!("  {share:<8}{survived:>12}{force:>15}{angle:>14}{cart:>11}")
+    let head = ["share", "survive", "force, N rms", "angle, mrad", "cart, mm", "ended by"];
+    let row = |[share, survived, force, angle, cart, ended_by]: [&str; 6]| {
+        format!("  {share:<8}{survived:>12}{force:>15}{angle:>14}{cart:>11}   {ended_by}")
     };
     writeln!(out, "{}", row(head))?;
     for runs in &judgement.machines {
@@ -80,7 +80,8 @@ fn write_judgement(out: &mut String, judgement: &Judgement) -> core::fmt::Result
         // They are of the runs that survived: blank if none did.
         let [force, angle, cart] =
             figures.map(|figure| if runs.survived == 0 { String::new() } else { significant(figure, 3) });
-        writeln!(out, "{}", row([&share, &survived, &force, &angle, &cart]).trim_end())?;
+        let ended_by = runs.ended_by.map_or(String::new(), |kind| kind.to_string());
+        writeln!(out, "{}", row([&share, &survived, &force, &angle, &cart, &ended_by]).trim_end())?;
     }
     match judgement.corners {
         Some([all, survived]) => writeln!(out, "  wrong masses: {survived} of {all} combinations survive"),
