@@ -101,8 +101,8 @@ fn table(measured: &[Instructions]) -> String {
     table
 }
 
-/// Holds the measured numbers within a tenth of those in docs/results/chips.md. With UPRIGHT_BLESS=1 in the environment,
-/// writes them there instead.
+/// Holds the measured numbers within a tenth of those in docs/results/chips.md. With UPRIGHT_BLESS=1 in the
+/// environment, writes them there instead.
 fn hold_the_document(measured: &[Instructions]) {
     let path: PathBuf = repository().join("docs/results/chips.md");
     let page = std::fs::read_to_string(&path).unwrap();
