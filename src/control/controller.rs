@@ -1,13 +1,14 @@
 //! The controller: one tick from encoder counts to motor duty cycle.
 
 mod motion;
+mod steps;
 
 use crate::control::actuator::Drive;
 use crate::control::encoder::{CounterWidth, Encoders};
 use crate::control::observer::Observer;
 pub use crate::control::rejected::Rejected;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
-use crate::table::{GainTable, Law, LawGains, Scalar, StepMap, TableError};
+use crate::table::{GainTable, Law, LawGains, Scalar, TableError};
 use nalgebra::SVector;
 
 /// Observer, control law and actuator map of one gain table.
@@ -243,8 +244,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         self.last_volts = T::default();
         self.friction = [T::default(); NY];
         (self.requested, self.applied) = (T::default(), T::default());
-        self.emitted =
-            self.table.steps.as_ref().and_then(|steps| steps.nearest(self.position())).unwrap_or_default();
+        self.emitted = self.nearest_step();
         self.mode = self.started;
     }
 
@@ -350,19 +350,6 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         requested
     }
 
-    /// Limits the acceleration and converts it to the pulses of this tick. Their count defines the position: each tick
-    /// ends at the step nearest to the predicted position, so that what is rounded off is not lost.
-    #[inline(never)]
-    fn step(&mut self, steps: &StepMap<T>, requested: T) -> MotorCommand<T> {
-        let (tick_s, speed) = (self.table.tick_s, self.speed());
-        self.applied = steps.limited(requested, speed, tick_s);
-        let mean = speed + T::from_f32(0.5) * self.applied * tick_s;
-        // A state that is not a number moves nothing; the supervisor turns the motor off.
-        let target = steps.nearest(self.position() + mean * tick_s).unwrap_or(self.emitted);
-        let pulses = target.wrapping_sub(core::mem::replace(&mut self.emitted, target));
-        MotorCommand { requested_n: requested, applied_n: self.applied, drive: Drive::Steps(pulses) }
-    }
-
     /// Limits the force and converts it for the power stage.
     #[inline]
     fn actuate(&mut self, requested: T) -> MotorCommand<T> {
@@ -429,11 +416,6 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// [`predict`](Self::predict).
     fn acting(&self) -> T {
         if self.active.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
-    }
-
-    /// The cart's position (m).
-    fn position(&self) -> T {
-        self.estimate.get(0).copied().unwrap_or_default()
     }
 
     /// The cart's speed (m/s), the state after its position.

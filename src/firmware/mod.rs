@@ -116,8 +116,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// The firmware, motor off. `start` is what the board knows about its start: a [`Start`], or just a
     /// [`Reset`](crate::protocol::message::Reset). Without swing-up, `swing_up` is [`NoSwingUp`].
     ///
-    /// There is a firmware for every table: if one is damaged, or its drive imposes the cart's acceleration, [`Fault::Table`] is latched, cannot be cleared, and is
-    /// reported to the host. To know before, call [`GainTable::check`] and [`SwingUp::check`].
+    /// There is a firmware for every table: if one is damaged, or its drive imposes the cart's acceleration,
+    /// [`Fault::Table`] is latched, cannot be cleared, and is reported to the host. To know before, call
+    /// [`GainTable::check`] and [`SwingUp::check`].
     // Returns no `Result`, which would put a copy of the firmware on the stack.
     #[inline(never)]
     pub fn new(

@@ -8,7 +8,7 @@ use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
 use upright_design::harness::{Harness, HarnessError, with_firmware};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Sensing};
+use upright_design::simulate::{Scenario, Sensing, SimulationError};
 use upright_design::table::{TableValues, gains_source};
 
 /// Ticks of the run with which machines are compared.
@@ -33,12 +33,13 @@ pub enum PullRounding {
 }
 
 /// Checksums of a table and of a run, and what happened in that run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// SHA-256 of the table's source text.
     pub table: String,
-    /// SHA-256 of every tick's output, of all bytes that the firmware sent, and of the true state of the rig.
-    pub run: String,
+    /// SHA-256 of every tick's output, of all bytes that the firmware sent, and of the true state of the rig; none if
+    /// the firmware is not compiled for the size of the rig.
+    pub run: Option<String>,
     /// Ticks spent in each state that moves the motor: balancing, raising, lowering.
     pub ticks: [u32; 3],
     /// The fault at the end: an encoder breaks in the last tenth of the run.
@@ -50,18 +51,22 @@ impl Fingerprint {
     /// raised again if it has the motions, and an encoder breaks.
     ///
     /// # Errors
-    /// [`FingerprintError`] if the firmware is not compiled for its size, or does not begin to balance.
+    /// [`FingerprintError`] if the firmware refuses the table, or does not begin to balance.
     pub fn of(
         rig: &Rig,
         table: &TableValues,
         rounding: PullRounding,
         ticks: u32,
     ) -> Result<Self, FingerprintError> {
-        let mut fingerprint = with_firmware(table, |firmware| -> Result<Self, HarnessError> {
+        let ran = with_firmware(table, |firmware| -> Result<Self, HarnessError> {
             let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(rig, Law::Lqr) };
             let harness = Harness::new(rig, table, &scenario, firmware)?;
             run(harness, rig, table, (rounding, ticks))
-        })??;
+        });
+        let mut fingerprint = match ran {
+            Err(HarnessError::Simulation(SimulationError::Size { .. })) => Self::default(),
+            ran => ran??,
+        };
         fingerprint.table = hex(&Sha256::digest(gains_source(rig, table)));
         Ok(fingerprint)
     }
@@ -107,7 +112,7 @@ fn run(
         harness.session.forget_received();
     }
     let fault = harness.session.fault().map(|fault| fault.to_string());
-    Ok(Fingerprint { table: String::new(), run: hex(&hash.finalize()), ticks: spent, fault })
+    Ok(Fingerprint { table: String::new(), run: Some(hex(&hash.finalize())), ticks: spent, fault })
 }
 
 /// A pull on the cart (N): three triangular waves, which need no function that machines compute differently.

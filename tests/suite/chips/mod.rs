@@ -101,7 +101,7 @@ fn table(measured: &[Instructions]) -> String {
     table
 }
 
-/// Holds the measured numbers to those of docs/results/chips.md, which may be a tenth lower. With UPRIGHT_BLESS=1 in the
+/// Holds the measured numbers within a tenth of those in docs/results/chips.md. With UPRIGHT_BLESS=1 in the
 /// environment, writes them there instead.
 fn hold_the_document(measured: &[Instructions]) {
     let path: PathBuf = repository().join("docs/results/chips.md");

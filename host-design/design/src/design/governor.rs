@@ -4,7 +4,8 @@ use super::synthesis::{Design, Feedback};
 use crate::numerics::Matrix;
 use crate::rig::{Rig, defaults};
 
-/// Share of the angle and force limits, or those of acceleration and speed, that a motion of the set-point may use; the rest is left for disturbances.
+/// Share of the limits on angle and force, or on angle, acceleration and speed, that a motion of the set-point may use;
+/// the rest is left for disturbances.
 const SHARE: f64 = 0.5;
 
 /// Largest change of the set-point per tick (m). In the linear model, every link and the force then stay within half

@@ -206,6 +206,7 @@ fn nearest(x: &BigFloat, format: &Format) -> u64 {
     }
     // x = 0.w · 2^exponent with the top bit of the last word set: 1.f · 2^(exponent - 1). Words have 64 bits, or 32.
     let (rest, high) = words.split_at(words.len().saturating_sub(64 / WORD_BIT_SIZE));
+    #[allow(clippy::unnecessary_cast, reason = "a word has 32 bits in a browser")]
     let top = high.iter().rfold(0, |top: u64, &word| top.unbounded_shl(WORD_BIT_SIZE as u32) | word as u64);
     let sticky = rest.iter().any(|&word| word != 0);
     let exponent = i64::from(exponent) - 1;

@@ -33,8 +33,8 @@ pub trait Plant: Send {
     /// (joint torques in N·m) held constant.
     fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize);
 
-    /// Makes the cart's speed jump (m/s), and the links' rates with it: as by an impulse on the cart. A linear model has
-    /// no cart, and stays as it is.
+    /// Makes the cart's speed jump (m/s), and the links' rates with it: as by an impulse on the cart. A linear model
+    /// has no cart, and stays as it is.
     fn set_cart_speed(&mut self, _speed: f64) {}
 
     /// Mechanical energy (J); none for a linear model.

@@ -197,8 +197,8 @@ impl Bench {
         self.advance(now, disturbance, rest)
     }
 
-    /// Simulates one tick of a drive that imposes the cart's motion by `pulses`, spread evenly. Without a motor they are a
-    /// constant speed, and forces on the cart change nothing. Without pulses, as when the drive is off, the cart
+    /// Simulates one tick of a drive that imposes the cart's motion by `pulses`, spread evenly. Without a motor they
+    /// are a constant speed, and forces on the cart change nothing. Without pulses, as when the drive is off, the cart
     /// stands.
     fn step(&mut self, pulses: i32, step_m: f64) {
         let (_, disturbance) = self.begin(Drive::OFF);

@@ -181,6 +181,26 @@ fn a_quadruple_balances_on_pulses() {
     assert!(!summary.survives(), "{summary}");
 }
 
+/// Every path of the set-point leaves half of the drive's acceleration and speed.
+#[test]
+fn the_governor_leaves_half_of_the_drives_limits() {
+    let mut rig = rig("single-stepper");
+    let step = |rig: &Rig| table(rig).laws.lqr.as_ref().unwrap().setpoint_step;
+    let free = step(&rig);
+    let drive = rig.actuator.acceleration.as_mut().unwrap();
+    (drive.speed_limit_m_per_s, drive.acceleration_limit_m_per_s2) = (Some(0.1), 1.0);
+    let slow = step(&rig);
+    assert!(slow < free, "{slow} {free}");
+    let scenario = Scenario { step_m: 0.12, duration_s: 15.0, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let (trace, summary) = simulate(&rig, &table(&rig), &scenario).unwrap();
+    assert!(summary.survives() && summary.final_error_m.abs() < 5e-3, "{summary}");
+    let fastest = trace.samples().map(|sample| sample.estimate[1].abs()).fold(0.0, f64::max);
+    assert!(fastest <= 0.051 && summary.peak_force_n <= 0.51, "{fastest} m/s, {summary}");
+    // Negative control: without the governor, the same step goes to the limits.
+    let (trace, _) = simulate(&rig, &table(&rig).without_governor(), &scenario).unwrap();
+    assert!(trace.samples().any(|sample| sample.force.abs() > 0.9));
+}
+
 #[test]
 fn the_public_machine_balances_and_follows_its_set_point() {
     let rig = rig("single-stepper");
@@ -226,6 +246,7 @@ fn keys_of_a_force_are_refused_with_what_to_do() {
     refused("[limits]\n", "[limits]\njog_force_n = 1\n", &["limits.jog_force_n", "leave it out"]);
     refused("[limits]\n", "[reality]\ncart_friction_n = 1\n[limits]\n", &["reality.cart_friction_n"]);
     refused("[limits]\n", "[reality]\nlatency_s = 1e-4\n[limits]\n", &["reality.latency_s"]);
+    refused("[limits]\n", "[robust]\ncart_friction_n = 1\n[limits]\n", &["robust.cart_friction_n"]);
     refused("[limits]\n", "[friction]\ncart_n = 1\n[limits]\n", &["friction.cart_n"]);
     // And the other way round.
     let force = std::fs::read_to_string(crate::published::rig_path("quadruple-paper")).unwrap();

@@ -5,7 +5,7 @@ use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
-use super::chain::PlantDescription;
+use super::chain::{CartInput, PlantDescription};
 
 /// `[robust]`
 pub(crate) static ROBUST: Section = Section {
@@ -86,11 +86,14 @@ pub(crate) fn robust(
     plant: &PlantDescription,
     period_s: f64,
 ) -> Result<Tolerances, RigError> {
-    if !matches!(plant, PlantDescription::Chain(_)) {
+    let PlantDescription::Chain(chain) = plant else {
         let remedy = "describe the machine by [cart] and [[link]], or leave [robust] out";
         return Err(node.out_of_range("only a chain of links", remedy));
-    }
+    };
     let table = node.table(&ROBUST)?;
+    if chain.input == CartInput::Acceleration {
+        table.refuse_for_acceleration(&["cart_friction_n", "latency_s"])?;
+    }
     let tolerances = Tolerances::read(&table)?;
     match tolerances.too_large(period_s).and_then(|(name, _, accepts)| Some((table.get(name)?, accepts))) {
         Some((node, accepts)) => {
