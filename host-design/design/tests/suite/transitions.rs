@@ -206,7 +206,8 @@ fn where_a_link_hangs_a_defect_turns_the_motor_off() {
     let table = table_to_hold(&table);
     let as_asked = |_: &mut Drive| ();
     assert_eq!(ended(&rig, &table, |_, _| (), as_asked), None, "the negative control");
-    // The hanging link hardly moves, so its encoder may freeze unnoticed; but a jump has to be noticed.
+    // The hanging link hardly moves, so its encoder may freeze unnoticed; but a jump has to be noticed. The upright link
+    // may leave its path before its encoder is accused.
     for (sensor, most) in [(0, 3000), (1, 1000)] {
         let mut seen = 0;
         let frozen = |held: usize, pins: &mut Pins| {
@@ -217,7 +218,7 @@ fn where_a_link_hangs_a_defect_turns_the_motor_off() {
         };
         let (fault, ticks) = ended(&rig, &table, frozen, as_asked).expect("a frozen encoder");
         assert!(
-            matches!(fault, Fault::Encoder | Fault::Frozen) && ticks <= most,
+            matches!(fault, Fault::Encoder | Fault::Frozen | Fault::TrackingError) && ticks <= most,
             "{sensor}: {fault} {ticks}"
         );
     }
@@ -232,14 +233,17 @@ fn where_a_link_hangs_a_defect_turns_the_motor_off() {
     let stop = |held: usize, pins: &mut Pins| pins.contacts.emergency_stop = held >= ONSET;
     let (fault, ticks) = ended(&rig, &table, stop, as_asked).expect("the emergency stop");
     assert!(fault == Fault::EmergencyStop && ticks <= 2, "{fault} {ticks}");
-    for factor in [0.0, -1.0] {
+    // A dead motor at rest looks like the friction that a typical cart has, until the cart leaves its path.
+    let dead: fn(Fault) -> bool = |fault| matches!(fault, Fault::Motor | Fault::TrackingError);
+    let reversed: fn(Fault) -> bool = |fault| fault == Fault::Motor;
+    for (factor, is_meant, most) in [(0.0, dead, 600), (-1.0, reversed, 100)] {
         let broken = |drive: &mut Drive| match drive {
             Drive::Duty(value) | Drive::Force(value) => *value *= factor,
             Drive::Steps(_) => panic!("pulses for a motor"),
         };
         let (fault, ticks) =
             ended(&rig, &table, |_, _| (), broken).expect("a motor that is dead or reversed");
-        assert!(fault == Fault::Motor && ticks <= 100, "{factor}: {fault} {ticks}");
+        assert!(is_meant(fault) && ticks <= most, "{factor}: {fault} {ticks}");
     }
 }
 
