@@ -206,8 +206,8 @@ fn where_a_link_hangs_a_defect_turns_the_motor_off() {
     let table = table_to_hold(&table);
     let as_asked = |_: &mut Drive| ();
     assert_eq!(ended(&rig, &table, |_, _| (), as_asked), None, "the negative control");
-    // The hanging link hardly moves, so its encoder may freeze unnoticed; but a jump has to be noticed. The upright link
-    // may leave its path before its encoder is accused.
+    // The hanging link hardly moves, so its encoder may freeze unnoticed; but a jump has to be noticed. The upright
+    // link may leave its path before its encoder is accused.
     for (sensor, most) in [(0, 3000), (1, 1000)] {
         let mut seen = 0;
         let frozen = |held: usize, pins: &mut Pins| {

@@ -117,7 +117,7 @@ keys! {
 }
 
 /// Voltages of the motor are given before the driver's bridge, where the full duty cycle is the supply: a motor behind
-/// transistors that lose a part of the supply has the resistance and the back-EMF of [`Motor::before_bridge`].
+/// transistors that lose a part of the supply seems to have more resistance and more back-EMF.
 impl Motor {
     /// Back-EMF per cart speed, `gear Ke / r` (V·s/m).
     pub fn volts_per_speed(&self) -> f64 {

@@ -125,8 +125,8 @@ pub enum LinkEncoder {
     CountsPerRev(f64),
 }
 
-/// Keys of measurements of a link, which [`link`] turns into the fields of [`Link`]. A program that writes those fields
-/// into a rig file takes these keys out.
+/// Keys of measurements of a link, which become the fields of [`Link`] when a file is read. A program that writes those
+/// fields into a rig file takes these keys out.
 pub const MEASUREMENTS_OF_A_LINK: [&str; 4] =
     ["inertia_about_joint_kg_m2", "tip_mass_kg", "swing_period_s", "swing_half_life_s"];
 
