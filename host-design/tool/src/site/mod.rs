@@ -13,6 +13,7 @@ mod error;
 mod examples;
 mod module;
 mod page;
+mod twin;
 
 pub use error::SiteError;
 pub use examples::examples;

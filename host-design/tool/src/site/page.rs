@@ -4,15 +4,17 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::figure::{COLOURS_CSS, style_sheet};
+use super::twin::TwinPage;
+use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 
 const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
-const WORKER: &str = include_str!("page/worker.js");
-const SCRIPTS: [&str; 4] = [
+const WORKER: &str = concat!(include_str!("page/worker.js"), include_str!("page/running.js"));
+const SCRIPTS: [&str; 5] = [
     include_str!("page/link.js"),
     include_str!("page/drawing.js"),
     include_str!("page/editor.js"),
+    include_str!("page/balance.js"),
     include_str!("page/desk.js"),
 ];
 
@@ -26,6 +28,8 @@ pub struct Example {
     pub name: String,
     /// Its rig file.
     pub toml: String,
+    /// Its stored motions from hanging to upright and back, if there are any.
+    pub motions: Option<String>,
 }
 
 /// The page with this module and these examples.
@@ -36,17 +40,23 @@ pub fn page(module: &[u8], examples: &[Example]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
     let script = format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat());
+    let twin = TwinPage::new();
+    // A document inside the page has its policy.
     let policy = format!(
-        "default-src 'none'; script-src '{}' 'wasm-unsafe-eval' blob:; style-src '{}'; img-src data:; \
+        "default-src 'none'; script-src '{}' '{}' 'wasm-unsafe-eval' blob:; style-src '{}' '{}'; img-src data:; \
          worker-src blob:; base-uri 'none'; form-action 'none'",
         source(&script),
-        source(&style)
+        source(&twin.script),
+        source(&style),
+        source(&twin.style)
     );
     let parts = [
         ("{policy}", policy),
         ("{style}", style),
         ("{examples}", json(&examples)),
         ("{worker}", json(&WORKER)),
+        ("{twin}", json(&twin.html)),
+        ("{theme}", json(&page_theme())),
         ("{module}", base64(&compress_to_vec_zlib(module, COMPRESSION))),
         ("{script}", script),
     ];
@@ -103,9 +113,9 @@ mod tests {
     #[test]
     fn the_page_holds_all_of_its_parts_and_asks_for_nothing() {
         let toml = "name = \"</script>\"".to_owned();
-        let page = page(b"module", &[Example { name: "mine".to_owned(), toml }]);
+        let page = page(b"module", &[Example { name: "mine".to_owned(), toml, motions: None }]);
         assert!(page.contains("default-src 'none'") && page.contains("<\\/script>"));
-        assert_eq!(page.matches("</script>").count(), 4);
+        assert_eq!(page.matches("</script>").count(), 6);
         assert!(page.trim_end().ends_with("</html>"), "a mark is missing in the page");
         for request in ["src=\"", "@import", "fetch(", "XMLHttpRequest", "https://", "url("] {
             assert!(!page.contains(request), "{request}");

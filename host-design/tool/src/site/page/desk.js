@@ -7,6 +7,7 @@ const LEAST_MS = 16;
 const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, error: null };
 let checker = null;
 let designer = null;
+let twin = null;
 
 const editor = new Editor(() => changed());
 const set = (key, value) => {
@@ -30,7 +31,7 @@ function changed() {
 
 function checked(answer) {
   editor.mark(answer.failed);
-  for (const id of ['save-table', 'save-header', 'save-csv']) byId(id).disabled = true;
+  for (const id of ['save-table', 'save-header', 'save-csv', 'balance']) byId(id).disabled = true;
   if (answer.failed !== undefined) return;
   desk.sketch = answer;
   byId('unusual').replaceChildren(...answer.unusual.map((text) => element('li', { textContent: text })));
@@ -65,8 +66,7 @@ function designed(answer, ms) {
   }
   const table = answer.crc === null ? `no table: ${answer.no_table}` : `table ${answer.crc}`;
   tell(`${answer.states} states; every gain equal at ${answer.bits[0]} and ${answer.bits[1]} bits; ${table}; designed and run in ${(ms / 1e3).toFixed(2)} s`);
-  for (const id of ['save-table', 'save-header']) byId(id).disabled = answer.crc === null;
-  byId('save-csv').disabled = answer.crc === null;
+  for (const id of ['save-table', 'save-header', 'save-csv', 'balance']) byId(id).disabled = answer.crc === null;
   showLoop();
   showDesign();
 }
@@ -217,6 +217,10 @@ function listen() {
   }
   byId('law').addEventListener('change', () => { showLoop(); showDesign(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
+  byId('balance').addEventListener('click', () => {
+    const motions = examples.find(({ name }) => name === desk.sketch.rig)?.motions ?? null;
+    twin.open({ toml: editor.value, motions, upright: byId('raised').checked });
+  });
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
   byId('save-header').addEventListener('click', () => saveExported('header', 'controller.h'));
@@ -248,6 +252,7 @@ async function begin() {
   const module = await moduleBytes();
   checker = new Thread(module);
   designer = new Thread(module);
+  twin = new Twin(module, (why) => tell(why, true));
   changed();
 }
 

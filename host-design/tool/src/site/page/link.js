@@ -36,6 +36,14 @@ class Thread {
     this.next();
   }
 
+  // Runs a rig, for the page at the other end of the port.
+  run(rig, theme, port, take) {
+    this.ready.then(() => {
+      this.asked = { take };
+      this.worker.postMessage({ id: 'run', rig, theme }, [port]);
+    });
+  }
+
   answerTo(question) {
     return new Promise((take) => { this.ask(`${question.ask}-${performance.now()}`, question, take); });
   }
