@@ -54,7 +54,7 @@ struct Twin {
 enum Power {
     On(Box<World<'static, 'static>>),
     /// The firmware has stopped, and why; properties for the next power-up.
-    Stopped(String, Properties),
+    Stopped(String, Box<Properties>),
 }
 
 impl InPage {
@@ -153,13 +153,13 @@ impl Twin {
     fn properties(&self) -> Properties {
         match &self.world {
             Power::On(world) => world.properties().clone(),
-            Power::Stopped(_, properties) => properties.clone(),
+            Power::Stopped(_, properties) => Properties::clone(properties),
         }
     }
 
     fn stop(&mut self, error: &HarnessError) {
         self.console.monitor.note(format!("{error}; switch the power off and on"));
-        self.world = Power::Stopped(error.to_string(), self.properties());
+        self.world = Power::Stopped(error.to_string(), Box::new(self.properties()));
     }
 
     fn switch_off_and_on(&mut self, upright: bool) {
@@ -207,4 +207,35 @@ fn powered(
 ) -> Result<Box<World<'static, 'static>>, HarnessError> {
     let target = endless_firmware(machine.table)?;
     Ok(Box::new(World::new(machine, target, properties, upright, epoch)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rig_that_was_broken_balances_again_after_the_power_was_switched_off_and_on() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../rigs/single-quanser-ip02.toml");
+        let toml = std::fs::read_to_string(file).unwrap();
+        let mut twin = InPage::default();
+        let mut ask =
+            |question: Value| -> Value { serde_json::from_str(&twin.answer(&question.to_string())).unwrap() };
+        let run = |what: Option<Value>| {
+            let asked: Vec<Value> =
+                what.iter().map(|what| json!({ "ask": "machine", "what": what })).collect();
+            json!({ "twin": "run", "asked": asked, "passed_s": 1.0, "most_ticks": 10_000, "is_silent": false })
+        };
+        // Negative control: without a rig, there is nothing to run.
+        assert!(ask(run(None))["failed"]["why"].as_str().unwrap().contains("no rig"));
+        let start = json!({ "twin": "start", "toml": toml, "upright": true, "since_1970_s": 1.7e9 });
+        assert_eq!(ask(start)["hello"]["rig"], "single-quanser-ip02");
+        let last = |answer: Value| {
+            answer["picture"]["telemetry"].as_array().unwrap().last().unwrap()["state"].clone()
+        };
+        assert_eq!(last(ask(run(None))), "Balancing");
+        let broken = json!({ "do": "defect", "name": "motor-reversed", "sensor": 0 });
+        assert_eq!(last(ask(run(Some(broken)))), "Fault");
+        ask(run(Some(json!({ "do": "restart", "upright": true }))));
+        assert_eq!(last(ask(run(None))), "Balancing");
+    }
 }

@@ -115,7 +115,7 @@ pub(super) struct DefectRun<'a> {
 
 impl DefectRun<'_> {
     fn run(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
-        if self.trial.kind.is_at_power_up() {
+        if self.trial.kind.begins_at_power_up() {
             return self.power_up(target);
         }
         if let During::Shaking(feed) = self.setup.during {

@@ -33,7 +33,7 @@ pub(super) trait OnChip {
     fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input>;
 
     /// Whether it is present from power-up on, and prevents arming.
-    fn is_at_power_up(self) -> bool;
+    fn begins_at_power_up(self) -> bool;
 
     /// Events in the first tick of the defect, for a board that receives from the host at the pin `receive`.
     fn events(self, trial: &Trial, table: &TableValues, image: &Image, receive: Pin) -> Vec<Event>;
@@ -68,7 +68,7 @@ impl OnChip for Defect {
         }
     }
 
-    fn is_at_power_up(self) -> bool {
+    fn begins_at_power_up(self) -> bool {
         matches!(self, Defect::CrystalMissing | Defect::CrystalWrong | Defect::ChipWrong | Defect::WriteLost)
     }
 

@@ -121,8 +121,8 @@ impl SerialLine {
         self.receive(buffer)
     }
 
-    /// Sends what is due in a conversation, and receives for at most 5 ms; returns the telemetry. A line that fails ends
-    /// the conversation.
+    /// Sends what is due in a conversation, and receives for at most 5 ms; returns the telemetry. A line that fails
+    /// ends the conversation.
     pub fn carry(&mut self, conversation: &mut Monitor) -> Vec<AnyTelemetry> {
         conversation.poll(now());
         match self.exchange(&conversation.take_outgoing(), &mut [0; 4096]) {

@@ -12,6 +12,7 @@
 mod error;
 mod examples;
 mod module;
+mod motions;
 mod page;
 mod twin;
 

@@ -185,6 +185,12 @@ function csvOfRun() {
   return `${['t_s', 'setpoint_m', desk.sketch.input, ...states].join()}\n${lines.join('\n')}\n`;
 }
 
+// The stored motions of the example that the rig began as; they are used if it has not changed.
+async function motions() {
+  const example = examples.find(({ name }) => name === desk.sketch.rig);
+  return example === undefined ? null : motionsOf(example);
+}
+
 // The rig in the address, behind the mark that is never sent to a server.
 function linkToRig() {
   const bytes = new TextEncoder().encode(editor.value);
@@ -217,9 +223,8 @@ function listen() {
   }
   byId('law').addEventListener('change', () => { showLoop(); showDesign(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
-  byId('balance').addEventListener('click', () => {
-    const motions = examples.find(({ name }) => name === desk.sketch.rig)?.motions ?? null;
-    twin.open({ toml: editor.value, motions, upright: byId('raised').checked });
+  byId('balance').addEventListener('click', async () => {
+    twin.open({ toml: editor.value, motions: await motions(), upright: byId('raised').checked });
   });
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
@@ -249,7 +254,7 @@ async function begin() {
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
   editor.set(rigOfLink() ?? first.toml);
-  const module = await moduleBytes();
+  const module = await inflated('module');
   checker = new Thread(module);
   designer = new Thread(module);
   twin = new Twin(module, (why) => tell(why, true));
@@ -257,5 +262,5 @@ async function begin() {
 }
 
 // For tests, and for the curious.
-globalThis.upright = { desk, exported, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
+globalThis.upright = { desk, exported, motions, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
 begin().catch((error) => tell(`this browser cannot compute the design: ${error.message}`, true));
