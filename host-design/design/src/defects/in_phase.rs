@@ -28,6 +28,7 @@ impl Defect {
         let special = match phase {
             Phase::Jogging => self.while_jogging(),
             Phase::Shaken => self.while_shaken(),
+            Phase::Raising | Phase::Lowering if self == Self::Push => Some(Expected::Bounded),
             Phase::Balancing | Phase::Raising | Phase::Lowering => None,
         };
         special.unwrap_or_else(|| self.expected())
@@ -82,7 +83,8 @@ impl Defect {
             | Defect::EncoderReversed
             | Defect::EncodersSwapped
             | Defect::MotorDead
-            | Defect::MotorReversed => Some(Expected::Bounded),
+            | Defect::MotorReversed
+            | Defect::Push => Some(Expected::Bounded),
             Defect::ArmUnhomed
             | Defect::ArmHanging
             | Defect::ArmStopped
