@@ -42,6 +42,17 @@ impl BoardName {
         }
     }
 
+    /// What it is sold as.
+    pub const fn product(self) -> &'static str {
+        match self {
+            BoardName::WeactF405 => "WeAct STM32F405",
+            BoardName::OlimexH405 => "Olimex STM32-H405",
+            BoardName::FeatherF405 => "Adafruit Feather STM32F405",
+            BoardName::DiscoveryF407 => "STM32F407G-DISC1",
+            BoardName::NucleoF446 => "NUCLEO-F446RE",
+        }
+    }
+
     /// Number of encoders that it can count: the cart's and those of the links.
     pub fn encoders(self) -> usize {
         self.conditions(0).wiring.encoders.len()

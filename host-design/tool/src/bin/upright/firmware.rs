@@ -1,9 +1,11 @@
 //! `upright firmware`: everything about the image, from building to monitoring.
 
 mod board;
+mod boards;
 mod build;
 mod built;
 mod cycles;
+mod drive;
 mod flash;
 mod monitor;
 mod run;
@@ -24,6 +26,7 @@ pub(crate) struct FirmwareCommand {
 
 #[derive(Subcommand)]
 enum FirmwareSubcommand {
+    Boards(boards::BoardsCommand),
     Build(build::BuildCommand),
     Cycles(Box<cycles::CyclesCommand>),
     Size(size::SizeCommand),
@@ -35,6 +38,7 @@ enum FirmwareSubcommand {
 impl FirmwareCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self.command {
+            FirmwareSubcommand::Boards(command) => command.run(),
             FirmwareSubcommand::Build(command) => command.run(),
             FirmwareSubcommand::Cycles(command) => command.run(),
             FirmwareSubcommand::Size(command) => command.run(),
