@@ -16,8 +16,10 @@ mod error;
 mod facts;
 mod forbidden;
 mod kept;
+mod pico;
 mod size;
 mod stack;
+mod uf2;
 
 pub use board::{BoardName, NoBoard};
 pub use build::{ImageKind, PROFILE, build, build_for};
@@ -28,5 +30,7 @@ pub use elf::{ElfError, LinkedImage};
 pub use error::{BuildError, TARGET};
 pub use facts::{BoardFacts, board_facts};
 pub use forbidden::forbidden_functions;
+pub use pico::{PICO_ENCODERS, PICO_TICK_S, PicoError, PicoImage, build_pico};
 pub use size::{CODE_LIMIT, ImagePart, RAM_LIMIT, Size, SizeError, size};
 pub use stack::{StackBound, StackError, StackLevel, stack_bound};
+pub use uf2::uf2;
