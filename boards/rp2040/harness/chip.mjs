@@ -1,9 +1,10 @@
 // A Raspberry Pi Pico in the emulator rp2040js, with the wires of docs/pico.md.
 //
-// Three things of the emulator are replaced here, because they do not follow the processor's clock, or take too long:
+// Four things of the emulator are replaced here, because they do not follow the processor's clock, or take too long:
 // - State machines run by the processor's cycles, not by a timer of the host. For speed, they stand still while nothing
 //   reaches them; the dead man's switch then counts the time that has passed.
 // - There is no boot ROM: the program starts at its vector table, with the flash readable.
+// - An interrupt that is pending already when `wfi` begins ends it, as on the chip.
 // - The watchdog only reports: `watchdog` is called, and the caller ends the run.
 
 import { RP2040, USBCDC } from 'rp2040js';
@@ -159,17 +160,18 @@ export class Pico {
   /** Time passes: for the timers, the encoders, and the state machines. */
   #pass(cycles) {
     this.clock.tick(cycles * CYCLE_NS);
-    this.sinceEdge += cycles;
-    if (this.sinceEdge >= EDGE) { this.sinceEdge = 0; this.#moveEncoders(); }
     const running = this.everyCycle ? cycles : Math.min(cycles, this.settling);
     this.#stepStateMachines(running);
     this.settling -= Math.min(running, this.settling);
     this.skipped += cycles - running;
+    // Last, so that the state machines have had their cycles since the edge before.
+    this.sinceEdge += cycles;
+    if (this.sinceEdge >= EDGE) { this.sinceEdge = 0; this.#moveEncoders(); }
   }
 
   /** Runs one instruction, or waits for the next event. */
   step() {
-    if (this.core.waiting && this.core.interruptsUpdated && this.core.checkForInterrupts()) this.core.waiting = false;
+    if (this.core.waiting && this.core.checkForInterrupts()) this.core.waiting = false;
     if (!this.core.waiting) return this.#pass(this.core.executeInstruction());
     const next = Math.ceil(this.clock.nanosToNextAlarm / CYCLE_NS);
     const moving = this.targets.some((target, encoder) => target !== this.counts[encoder]);
@@ -201,6 +203,12 @@ export class Pico {
       enabled: !!(pio[GUARD.block].pinValues & pio[GUARD.block].pinDirections & (1 << PINS.enable)),
       led: !!(sio.gpioValue & (1 << PINS.led)),
     };
+  }
+
+  /** From now on, the state machines never stand still. */
+  runEveryCycle() {
+    this.#catchUp();
+    this.everyCycle = true;
   }
 
   /** Stops the timer of the ticks. */

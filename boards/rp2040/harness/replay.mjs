@@ -11,17 +11,22 @@ const [path, encoders] = process.argv.slice(2);
 const pico = new Pico(path, Number(encoders));
 let first = null;
 
-/** Ticks stop: the cycles until the power stage is off, and until the watchdog ends the run; null if they do not. */
+/** Ticks stop: the cycles until the power stage is off, and until the watchdog resets the chip; null if they do not. */
 function stopTicks(limit) {
   const begin = pico.clock.nanos;
   const cycles = () => Math.round((pico.clock.nanos - begin) / 8);
   const stopped = { disabled: null, reset: null };
-  pico.watchdog = () => { stopped.reset ??= cycles(); };
-  pico.everyCycle = true;
+  // The emulator's watchdog would report again and again at the same time.
+  pico.watchdog = () => { stopped.reset = cycles(); throw stopped; };
+  pico.runEveryCycle();
   pico.stopTicks();
-  while (cycles() < limit && (stopped.disabled === null || stopped.reset === null)) {
-    pico.step();
-    if (!pico.outputs().enabled) stopped.disabled ??= cycles();
+  try {
+    while (cycles() < limit) {
+      pico.step();
+      if (!pico.outputs().enabled) stopped.disabled ??= cycles();
+    }
+  } catch (thrown) {
+    if (thrown !== stopped) throw thrown;
   }
   return stopped;
 }
