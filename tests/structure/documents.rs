@@ -5,7 +5,7 @@ use std::path::Path;
 /// README.md, ARCHITECTURE.md and the pages in `docs/`, each.
 const MOST_WORDS_OF_A_PAGE: usize = 2000;
 /// All of them together.
-const MOST_WORDS: usize = 22_000;
+const MOST_WORDS: usize = 23_000;
 
 /// The words of a page, of which each has a letter or a digit. Tables and listings that a test compares with the code,
 /// between `<!-- name -->` and `<!-- /name -->`, are not counted.

@@ -48,6 +48,8 @@ export class Pico {
     this.core.VTOR = 0x10000100;
     this.core.SP = this.chip.flashView.getUint32(0x100, true);
     this.core.PC = this.chip.flashView.getUint32(0x104, true) & ~1;
+    /** The least stack pointer so far. */
+    this.lowest = this.core.SP;
     this.settling = 0;
     this.skipped = 0;
     for (const block of this.chip.pio) this.#followTheProcessor(block);
@@ -172,7 +174,11 @@ export class Pico {
   /** Runs one instruction, or waits for the next event. */
   step() {
     if (this.core.waiting && this.core.checkForInterrupts()) this.core.waiting = false;
-    if (!this.core.waiting) return this.#pass(this.core.executeInstruction());
+    if (!this.core.waiting) {
+      this.#pass(this.core.executeInstruction());
+      if (this.core.SP < this.lowest) this.lowest = this.core.SP;
+      return;
+    }
     const next = Math.ceil(this.clock.nanosToNextAlarm / CYCLE_NS);
     const moving = this.targets.some((target, encoder) => target !== this.counts[encoder]);
     const most = moving ? EDGE : this.settling > 0 ? this.settling : 1e5;
@@ -202,6 +208,7 @@ export class Pico {
       positive: !!(sio.gpioValue & (1 << PINS.direction)),
       enabled: !!(pio[GUARD.block].pinValues & pio[GUARD.block].pinDirections & (1 << PINS.enable)),
       led: !!(sio.gpioValue & (1 << PINS.led)),
+      stack: this.chip.flashView.getUint32(0x100, true) - this.lowest,
     };
   }
 

@@ -20,6 +20,8 @@ pub(super) struct Answer {
     pub(super) positive: bool,
     pub(super) enabled: bool,
     pub(super) cycles: u32,
+    /// The most stack in use so far (bytes).
+    pub(super) stack: u32,
     pub(super) sent: Vec<u8>,
 }
 
@@ -110,6 +112,7 @@ fn answer(object: &Value) -> Answer {
         positive: flag("positive"),
         enabled: flag("enabled"),
         cycles: number("cycles"),
+        stack: number("stack"),
         sent: digits.chunks(2).map(byte).collect(),
     }
 }

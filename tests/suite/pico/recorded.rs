@@ -49,8 +49,8 @@ impl Recorded {
     }
 }
 
-/// The firmware, with its wires tapped. A defect changes what is on them, from that many ticks after the first one in its
-/// state.
+/// The firmware, with its wires tapped. A defect changes what is on them, from that many ticks after the first one in
+/// its state.
 struct Tap<'a, D> {
     target: &'a mut dyn Target,
     defect: Option<(State, usize, D)>,

@@ -12,8 +12,8 @@ const _: () = assert!(SENSORS <= ENCODERS.len(), "the board counts fewer encoder
 /// The length of the program: what follows it in PIO 1 is free.
 pub(super) const LENGTH: usize = COUNT.len();
 
-/// Counts in Y. The first 16 words are a table of jumps by the last and the present level of both phases, so the program
-/// has to begin at 0. Entries 14 and 15 are part of the program as well.
+/// Counts in Y. The first 16 words are a table of jumps by the last and the present level of both phases, so the
+/// program has to begin at 0. Entries 14 and 15 are part of the program as well.
 const COUNT: [u16; 24] = [
     UPDATE,
     DECREMENT,

@@ -25,8 +25,8 @@ impl Supply {
         Self { converter }
     }
 
-    /// The voltage measured in the previous tick (V); starts the next conversion, which takes 2 µs. If the converter has
-    /// not finished, the voltage is 0 V.
+    /// The voltage measured in the previous tick (V); starts the next conversion, which takes 2 µs. If the converter
+    /// has not finished, the voltage is 0 V.
     pub(super) fn volts(&mut self) -> f32 {
         let is_ready = self.converter.cs().read().bits() & READY != 0;
         let steps = if is_ready { self.converter.result().read().bits() } else { 0 };

@@ -6,7 +6,7 @@ use upright_design::table::WriteError;
 
 use super::board::BoardName;
 use super::elf::ElfError;
-use super::pico::PicoError;
+use super::pico_limits::PicoError;
 use crate::project::NoCheckout;
 
 /// The target that images are compiled for: Cortex-M4 with single-precision floating point.

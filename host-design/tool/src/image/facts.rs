@@ -1,7 +1,7 @@
 //! The boards as a list of facts.
 
 use super::board::BoardName;
-use super::pico::{PICO_ENCODERS, PICO_TICK_S};
+use super::pico_limits::{PICO_ENCODERS, PICO_TICK_S};
 
 /// A board that there is an image for.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
