@@ -10,7 +10,7 @@ pub(crate) use upright_test_support::equipment::in_qemu;
 
 /// What was built or found; `None` if it needs the missing compiler for the image. `what` it is for.
 pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Option<T> {
-    let is_missing = |error: &BuildError| matches!(error, BuildError::NoCompiler);
+    let is_missing = |error: &BuildError| matches!(error, BuildError::NoCompiler(_));
     upright_test_support::equipment::if_possible(result, is_missing, what)
 }
 

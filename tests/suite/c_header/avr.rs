@@ -6,6 +6,7 @@ use std::process::Command;
 
 use super::program::{Dialect, Program, is_there};
 use super::recorded::{FirmwareRun, recorded, scenario};
+use super::steps::{nothing, recorded_steps};
 use crate::published::rig_and_table;
 use upright::table::Law;
 use upright_design::export::c_header;
@@ -19,12 +20,18 @@ const UNO: Dialect<'_> =
 
 /// What the AVR has sent: hash, number of ticks of balancing, cycles of a tick, mean and largest.
 fn in_simavr(header: &str, recording: &str) -> [u32; 4] {
-    let program = Program::new(header, include_str!("avr.c"));
+    sent_by(&Program::new(header, include_str!("avr.c")), recording)
+}
+
+/// The four numbers that this program has sent.
+fn sent_by(program: &Program, recording: &str) -> [u32; 4] {
     program.add("recording.h", recording);
     let output = program.compiled(UNO);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let run = ["-m", "atmega328p", "-f", "16000000"];
-    let output = Command::new("simavr").args(run).arg(program.path()).output().unwrap();
+    let mut simavr = Command::new("simavr");
+    let output =
+        simavr.current_dir(program.path().parent().unwrap()).args(run).arg(program.path()).output().unwrap();
     let said =
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     // Numbers among the simulator's own words and colours.
@@ -100,15 +107,103 @@ fn an_arduino_uno_has_the_bits_of_the_firmware_in_no_more_cycles_than_documented
     assert!(mean <= 59_000 && worst <= 60_800, "{mean} {worst}");
 }
 
-/// Debian's package `arduino-core-avr`.
+/// A sketch of the examples, or a file beside it.
+fn example(path: &str) -> String {
+    std::fs::read_to_string(repository().join("examples/arduino").join(path)).unwrap()
+}
+
+/// What the pins of `avr_pulses.c` have done, from the simulator's record of them.
+struct PinRecord {
+    /// Pulses of each tick, those with the direction high subtracted.
+    pulses: Vec<i32>,
+    /// Shortest time between two pulses, as a share of the time that even ones have in their tick.
+    evenness: f64,
+}
+
+impl PinRecord {
+    fn read(vcd: &str) -> Self {
+        let name_of = |what: &str| {
+            let line = vcd.lines().find(|line| line.starts_with("$var") && line.contains(what)).unwrap();
+            line.split_whitespace().nth(3).unwrap().to_owned()
+        };
+        let [pulse, direction, tick] = ["pulse", "direction", "tick"].map(name_of);
+        let mut record = Self { pulses: Vec::new(), evenness: f64::INFINITY };
+        let (mut now, mut begun, mut sense, mut times) = (0.0, 0.0, 1, Vec::<f64>::new());
+        // A line is a time, or changes of pins: a level and the pin's name. At the start all are low.
+        for word in vcd.lines().skip_while(|line| !line.starts_with('#')).flat_map(str::split_whitespace) {
+            if let Some(time) = word.strip_prefix('#') {
+                now = time.parse().unwrap();
+            } else if word[1..] == direction {
+                sense = if word.starts_with('1') { -1 } else { 1 };
+            } else if word[1..] == tick && (word.starts_with('1') || !record.pulses.is_empty()) {
+                let even = (now - begun) / times.len() as f64;
+                let shares = times.windows(2).map(|pair| (pair[1] - pair[0]) / even);
+                record.evenness = shares.fold(record.evenness, f64::min);
+                record.pulses.push(0);
+                times.clear();
+                begun = now;
+            } else if word[1..] == pulse
+                && word.starts_with('1')
+                && let Some(pulses) = record.pulses.last_mut()
+            {
+                *pulses += sense;
+                times.push(now);
+            }
+        }
+        record
+    }
+}
+
+#[test]
+fn a_steppers_pulses_come_out_of_the_unos_pin_all_of_them_and_evenly() {
+    if !is_there("avr-gcc") || !is_there("simavr") || !has("/usr/include/simavr/avr", "libsimavr-dev") {
+        return;
+    }
+    let (rig, table) = rig_and_table("single-stepper");
+    let run = recorded_steps(rig, table, &scenario(rig, Law::Lqr, 1000), nothing);
+    let wanted: Vec<i32> = run.wanted.iter().map(|tick| tick.duty as i32).collect();
+    let mut recording =
+        format!("#define TICKS {}u\n#define PERIOD {}u\n", wanted.len(), (rig.tick.period_s * 2e6).round());
+    write!(recording, "static const int8_t recorded[] PROGMEM = {{").unwrap();
+    wanted.iter().for_each(|pulses| write!(recording, "{pulses}, ").unwrap());
+    recording += "};\n";
+    let with = |generator: &str| {
+        let program = Program::new("", include_str!("avr_pulses.c"));
+        program.add("pulses.h", generator);
+        let [wrong, ..] = sent_by(&program, &recording);
+        let vcd = std::fs::read_to_string(program.path().with_file_name("pulses.vcd")).unwrap();
+        (wrong, PinRecord::read(&vcd))
+    };
+    let generator = example("balance-stepper/pulses.h");
+    let (wrong, record) = with(&generator);
+    let all = wanted.iter().map(|pulses| pulses.unsigned_abs()).sum::<u32>();
+    println!("{all} pulses; evenness {}", record.evenness);
+    assert!(wrong == 0 && record.pulses == wanted, "{wrong} {:?}", record.pulses);
+    assert!(
+        all > 1000 && wanted.iter().any(|&pulses| pulses < -10) && wanted.iter().any(|&pulses| pulses > 10)
+    );
+    // 1.5 of 10 ms are kept free for the controller.
+    assert!(record.evenness > 0.83, "{}", record.evenness);
+    // Negative controls: a pulse too few, the wrong direction, and a burst.
+    let differs = |old: &str, new: &str| {
+        let changed = generator.replace(old, new);
+        assert_ne!(changed, generator);
+        with(&changed)
+    };
+    assert!(differs("if (--left == 0)", "if (--left <= 1)").1.pulses != wanted);
+    assert!(differs("(pulses < 0 ? _BV(PB0) : 0)", "(pulses > 0 ? _BV(PB0) : 0)").1.pulses != wanted);
+    assert!(differs("OCR1A += interval;", "OCR1A += interval / 2;").1.evenness < 0.83);
+}
+
+/// The Arduino's own library.
 const ARDUINO_AVR: &str = "/usr/share/arduino/hardware/arduino/avr";
 
-/// Whether the Arduino's own library is installed.
-fn has_core() -> bool {
-    let is_there = Path::new(ARDUINO_AVR).exists();
-    assert!(is_there || !is_required("UPRIGHT_REQUIRE_GCC"), "install arduino-core-avr");
+/// Whether this folder of a package of Debian is there.
+fn has(folder: &str, package: &str) -> bool {
+    let is_there = Path::new(folder).exists();
+    assert!(is_there || !is_required("UPRIGHT_REQUIRE_GCC"), "install {package}");
     if !is_there {
-        not_exercised("the Arduino sketch: install arduino-core-avr");
+        not_exercised(&format!("the C header on an Arduino: install {package}"));
     }
     is_there
 }
@@ -140,11 +235,10 @@ fn sketch(text: &str, header: &str) -> (String, bool) {
 
 #[test]
 fn the_sketch_compiles_for_an_arduino_uno_and_only_for_a_rig_with_one_link() {
-    if !is_there("avr-gcc") || !has_core() {
+    if !is_there("avr-gcc") || !has(ARDUINO_AVR, "arduino-core-avr") {
         return;
     }
-    let path = repository().join("examples/arduino/balance/balance.ino");
-    let text = std::fs::read_to_string(path).unwrap();
+    let text = example("balance/balance.ino");
     let header = |name| {
         let (rig, table) = rig_and_table(name);
         c_header(rig, table).unwrap()
@@ -153,4 +247,23 @@ fn the_sketch_compiles_for_an_arduino_uno_and_only_for_a_rig_with_one_link() {
     assert!(is_built, "{said}");
     let (said, is_built) = sketch(&text, &header("quadruple-paper"));
     assert!(!is_built && said.contains("this sketch has two encoders"), "{said}");
+}
+
+#[test]
+fn the_sketch_for_a_stepper_compiles_for_an_arduino_uno_and_not_for_a_motor() {
+    if !is_there("avr-gcc") || !has(ARDUINO_AVR, "arduino-core-avr") {
+        return;
+    }
+    let text = example("balance-stepper/balance-stepper.ino")
+        .replace("#include \"pulses.h\"", &example("balance-stepper/pulses.h"));
+    let header = |name| {
+        let (rig, table) = rig_and_table(name);
+        c_header(rig, table).unwrap()
+    };
+    let (said, is_built) = sketch(&text, &header("single-stepper"));
+    assert!(is_built, "{said}");
+    for name in ["single-quanser-ip02", "double-stepper"] {
+        let (said, is_built) = sketch(&text, &header(name));
+        assert!(!is_built && said.contains("for a stepper and one link"), "{name} {said}");
+    }
 }

@@ -7,6 +7,7 @@ mod arm;
 mod avr;
 mod program;
 mod recorded;
+mod steps;
 
 use program::{Dialect, Program, is_there, replayed};
 use recorded::{BALANCING, ControllerTick, Defect, FAULT, FirmwareRun, recorded, scenario};

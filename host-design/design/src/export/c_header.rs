@@ -11,6 +11,7 @@ use crate::rig::Rig;
 use crate::table::{MAX_SENSORS, MAX_STATES, TableValues, WithSize, with_size};
 
 const HEAD: &str = include_str!("head.txt");
+const STEPS: &str = include_str!("steps.txt");
 const COMPILER: &str = include_str!("compiler.h");
 const PARTS: &str = include_str!("parts.h");
 const CALLS: &str = include_str!("calls.h");
@@ -47,7 +48,8 @@ pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
     let observer = table.observer.as_ref().ok_or(NoHeader::NoObserver)?;
     let name = plain(&rig.name);
     let title = format!("Controller of the rig \"{name}\", written by `upright export --c`; do not edit.");
-    let mut out = format!("/* {title}\n\n{HEAD}*/\n\n");
+    let steps = if table.steps.is_some() { STEPS } else { "" };
+    let mut out = format!("/* {title}\n\n{HEAD}{steps}*/\n\n");
     out += "#ifndef UPRIGHT_CONTROLLER_H\n#define UPRIGHT_CONTROLLER_H\n\n";
     // Writing into a String cannot fail.
     let _ = constants(&mut out, &name, table);
@@ -91,6 +93,7 @@ fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Re
         define(&law.key().to_uppercase(), index.to_string())?;
     }
     define("HAS_MOTOR", u8::from(table.motor.is_some()).to_string())?;
+    define("HAS_STEPS", u8::from(table.steps.is_some()).to_string())?;
     define("HAS_FRICTION", u8::from(table.friction.is_some()).to_string())?;
     define("PATTERN", format!("{pattern} /* of Ad: see upright_predict_state */"))?;
     writeln!(
@@ -155,6 +158,11 @@ fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
         out.float("dead_zone_v", motor.dead_zone_v);
         out.float("slew_v_per_tick", motor.slew_v_per_tick);
         out.float("supply_v", motor.supply_v);
+    }
+    if let Some(steps) = &table.steps {
+        out.float("step_m", steps.step_m);
+        out.float("acceleration_limit_m_per_s2", steps.acceleration_limit_m_per_s2);
+        out.float("speed_limit_m_per_s", steps.speed_limit_m_per_s);
     }
     supervision(&mut out, table);
     out.indices("measured", &observer.measured[..sensors]);

@@ -42,7 +42,8 @@ UPRIGHT_CALL void upright_init(upright_controller *c)
 }
 
 /* Declares that the counters read `raw` at the positions `counts`; upright_table.rest_counts: the links hang at rest
-   and the cart is in the middle. Refused while armed, balancing or after a fault. */
+   and the cart is in the middle. With pulses, energize the motor before. Refused while armed, balancing or after a
+   fault. */
 UPRIGHT_CALL bool upright_home(upright_controller *c, const uint32_t *raw, const int32_t *counts)
 {
     if (c->state > UPRIGHT_READY) {
@@ -88,11 +89,13 @@ UPRIGHT_CALL bool upright_arm(upright_controller *c)
     return true;
 }
 
-/* Turns the motor off. */
+/* Turns the motor off. With pulses, the rig has to be homed again once it has balanced. */
 UPRIGHT_CALL void upright_disarm(upright_controller *c)
 {
-    if (c->state == UPRIGHT_ARMED || c->state == UPRIGHT_BALANCING) {
+    if (c->state == UPRIGHT_ARMED) {
         c->state = UPRIGHT_READY;
+    } else if (c->state == UPRIGHT_BALANCING) {
+        c->state = UPRIGHT_HAS_STEPS ? UPRIGHT_NOT_HOMED : UPRIGHT_READY;
     }
     c->setpoint_is_given = false;
     c->requested_n = c->applied_n = 0.0f;
@@ -101,21 +104,21 @@ UPRIGHT_CALL void upright_disarm(upright_controller *c)
 /* Turns the motor off until upright_clear(): limit switch, emergency stop, supply, a tick that came late ... */
 UPRIGHT_CALL void upright_trip(upright_controller *c) { upright_trip_at(c, UPRIGHT_CALLER, 0); }
 
-/* Clears a fault. After one of an encoder, the rig has to be homed again. */
+/* Clears a fault. After one of an encoder, the rig has to be homed again; with pulses, after any. */
 UPRIGHT_CALL bool upright_clear(upright_controller *c)
 {
     if (c->state != UPRIGHT_FAULT || c->fault == UPRIGHT_TABLE || c->fault == UPRIGHT_ARITHMETIC) {
         return c->state != UPRIGHT_FAULT;
     }
-    bool loses_positions = c->fault == UPRIGHT_ENCODER || c->fault == UPRIGHT_FROZEN;
+    bool loses_positions = UPRIGHT_HAS_STEPS || c->fault == UPRIGHT_ENCODER || c->fault == UPRIGHT_FROZEN;
     c->state = loses_positions ? UPRIGHT_NOT_HOMED : UPRIGHT_READY;
     c->fault = UPRIGHT_NO_FAULT;
     return true;
 }
 
-/* First half of a tick: from the readings of the counters to the duty cycle, -1 to 1, positive along +x. Drive the
+/* First half of a tick: from the readings of the counters to the duty cycle, or to the pulses of this tick. Drive the
    motor with it at once; 0 and c->state != UPRIGHT_BALANCING: turn it off. */
-UPRIGHT_CALL float upright_control(upright_controller *c, const uint32_t *raw)
+UPRIGHT_CALL upright_drive upright_control(upright_controller *c, const uint32_t *raw)
 {
     float y[UPRIGHT_SENSORS];
     upright_measure(c, raw, y);
@@ -124,7 +127,7 @@ UPRIGHT_CALL float upright_control(upright_controller *c, const uint32_t *raw)
         upright_measure(c, raw, y);
     }
     if (c->state != UPRIGHT_BALANCING) {
-        return 0.0f;
+        return 0;
     }
     upright_govern(c, upright_gains(c)->setpoint_step_m);
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
@@ -133,7 +136,7 @@ UPRIGHT_CALL float upright_control(upright_controller *c, const uint32_t *raw)
     uint8_t sensor = 0;
     upright_fault of_sensors = upright_test(c, y, &sensor);
     c->requested_n = upright_request(c);
-    float duty = upright_actuate(c);
+    upright_drive drive = upright_actuate(c);
     upright_fault fault = upright_exceeded(c);
     upright_count(&c->saturated, c->requested_n != c->applied_n);
     if (fault != UPRIGHT_NO_FAULT) {
@@ -143,9 +146,9 @@ UPRIGHT_CALL float upright_control(upright_controller *c, const uint32_t *raw)
     } else if (c->saturated > upright_table.saturated_ticks) {
         upright_trip_at(c, UPRIGHT_SATURATED, 0);
     } else {
-        return duty;
+        return drive;
     }
-    return 0.0f;
+    return 0;
 }
 
 /* Second half of a tick, any time before the next one: the prediction. */

@@ -71,6 +71,9 @@ typedef struct {
 #if UPRIGHT_HAS_MOTOR
     float volts_per_newton, volts_per_speed, dead_zone_v, slew_v_per_tick, supply_v;
 #endif
+#if UPRIGHT_HAS_STEPS
+    float step_m, acceleration_limit_m_per_s2, speed_limit_m_per_s;
+#endif
     /* Limits. */
     float rail_m[2], angle_rad, speed_m_per_s, arm_angle_rad;
     /* Thresholds of the tests of the innovation. */

@@ -1,5 +1,11 @@
 /* ---- State of the controller ---- */
 
+#if UPRIGHT_HAS_STEPS
+typedef int32_t upright_drive; /* pulses in this tick, spread evenly, positive along +x */
+#else
+typedef float upright_drive; /* duty cycle, -1 to 1, positive along +x */
+#endif
+
 typedef enum {
     UPRIGHT_NOT_HOMED, /* motor off; positions are unknown */
     UPRIGHT_READY,     /* motor off */
@@ -35,8 +41,11 @@ typedef struct {
     float setpoint_m; /* governed set-point, which the law follows */
     float integral, pending_n, last_volts;
     float friction[UPRIGHT_SENSORS];
-    float requested_n; /* force requested by the law */
-    float applied_n;   /* force after all limits */
+    float requested_n; /* force requested by the law; with pulses, acceleration (m/s^2) */
+    float applied_n;   /* the same after all limits */
+#if UPRIGHT_HAS_STEPS
+    int32_t emitted; /* pulses so far, from position 0 */
+#endif
     upright_sensor_memory sensors[UPRIGHT_SENSORS];
     float missing[2], correlation, energy;
 } upright_controller;
@@ -160,6 +169,16 @@ static inline void upright_update_slow(upright_controller *c)
     upright_count(&c->slow_ticks, true);
 }
 
+#if UPRIGHT_HAS_STEPS
+/* The step nearest to a position (m), or `otherwise` if that is not a number or beyond all counts. */
+static inline int32_t upright_nearest_step(float position_m, int32_t otherwise)
+{
+    float steps = position_m / upright_table.step_m;
+    steps += steps < 0.0f ? -0.5f : 0.5f;
+    return steps > -2147483648.0f && steps < 2147483648.0f ? (int32_t)steps : otherwise;
+}
+#endif
+
 /* Starts at rest at the present positions, with all memories cleared. */
 static inline void upright_start(upright_controller *c)
 {
@@ -177,6 +196,9 @@ static inline void upright_start(upright_controller *c)
     c->integral = c->pending_n = c->last_volts = 0.0f;
     c->saturated = 0;
     c->setpoint_m = c->estimate[UPRIGHT_OUTPUT];
+#if UPRIGHT_HAS_STEPS
+    c->emitted = upright_nearest_step(c->estimate[0], 0);
+#endif
     if (!c->setpoint_is_given) {
         c->target_m = c->setpoint_m;
     }
@@ -327,8 +349,34 @@ static inline float upright_request(upright_controller *c)
     return requested;
 }
 
+#if UPRIGHT_HAS_STEPS
+/* Limits the requested acceleration, so that the tick does not end faster than the drive may be. */
+static inline float upright_limited(float requested, float speed)
+{
+    const upright_table_type *t = &upright_table;
+    float limited = upright_saturate(requested, t->acceleration_limit_m_per_s2);
+    float next = speed + limited * UPRIGHT_TICK_S;
+    float within = upright_saturate(next, t->speed_limit_m_per_s);
+    if (within == next) {
+        return limited;
+    }
+    return upright_saturate((within - speed) / UPRIGHT_TICK_S, t->acceleration_limit_m_per_s2);
+}
+
+/* The pulses that bring the cart to the step nearest to where the tick ends. What is rounded off is not lost. */
+static inline upright_drive upright_actuate(upright_controller *c)
+{
+    float speed = upright_speed(c);
+    c->applied_n = upright_limited(c->requested_n, speed);
+    float mean = speed + 0.5f * c->applied_n * UPRIGHT_TICK_S;
+    int32_t target = upright_nearest_step(c->estimate[0] + mean * UPRIGHT_TICK_S, c->emitted);
+    int32_t pulses = (int32_t)((uint32_t)target - (uint32_t)c->emitted);
+    c->emitted = target;
+    return pulses;
+}
+#else
 /* Limits the requested force; returns the duty cycle, -1 to 1. */
-static inline float upright_actuate(upright_controller *c)
+static inline upright_drive upright_actuate(upright_controller *c)
 {
     float limited = upright_saturate(c->requested_n, upright_table.force_limit_n);
 #if UPRIGHT_HAS_MOTOR
@@ -346,6 +394,7 @@ static inline float upright_actuate(upright_controller *c)
     return upright_saturate(limited / upright_table.force_limit_n, 1.0f);
 #endif
 }
+#endif
 
 /* The first limit that estimate or requested force exceeds. */
 static inline upright_fault upright_exceeded(const upright_controller *c)

@@ -13,6 +13,7 @@
 //!
 //! - [`ChainParameters`]: the constants of the equations, in any precision.
 //! - [`absolute_angles`]: the angles `φ` of a state.
+//! - [`torques_of_force`]: the generalised forces of a force at a point.
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
 //! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n as a const parameter; their source is
 //!   [`upright::plant`].
@@ -24,6 +25,7 @@
 mod angles;
 mod chain;
 mod error;
+mod grip;
 mod jacobian;
 mod lanes;
 mod linear;
@@ -38,6 +40,7 @@ mod together;
 pub use angles::{absolute_angles, whole_turns, without_turns};
 pub use chain::{ChainPlant, Energy, WideChainState};
 pub use error::PlantError;
+pub use grip::torques_of_force;
 pub use jacobian::Partials;
 pub use linear::{LinearModel, linearise};
 pub use linear_simulation::LinearSimulation;

@@ -20,7 +20,7 @@ impl Tolerances {
         let gravity = chain.gravity_m_per_s2;
         let (mut outer_kg, mut least_n_m) = (0.0, f64::INFINITY);
         for link in chain.links.iter().rev() {
-            let own = link.mass_kg * link.centre_of_mass_m.unwrap_or(0.5 * link.length_m);
+            let own = link.mass_kg * link.centre_m();
             least_n_m = f64::min(least_n_m, gravity * (own + outer_kg * link.length_m));
             outer_kg += link.mass_kg;
         }

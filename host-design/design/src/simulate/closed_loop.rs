@@ -149,6 +149,12 @@ impl<'a> ClosedLoopRun<'a> {
                 self.controller.control(&self.counters)
             }
         };
+        if let Some(push) = &self.scenario.push
+            && let Some(chain) = self.rig.chain()
+            && let Some((force_n, torques_n_m)) = push.in_tick(self.time_s(), chain, &self.state)
+        {
+            self.bench.pull(force_n, &torques_n_m);
+        }
         copy_converted(&mut self.estimate, self.controller.estimate(), f64::from);
         if self.controller.fault().is_some() {
             command.drive = Drive::OFF;

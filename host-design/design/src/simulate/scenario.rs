@@ -2,6 +2,7 @@
 
 use upright::table::{Equilibrium, Law};
 
+use super::hand_push::HandPush;
 use crate::rig::{PlantDescription, Rig};
 
 /// One run: start, set-point, disturbances, sensors.
@@ -27,6 +28,8 @@ pub struct Scenario {
     pub torque_noise_n_m: f64,
     /// Constant disturbing force on the cart (N): a tilted rail, a cable that pulls.
     pub force_offset_n: f64,
+    /// A push by hand, in a run of the controller.
+    pub push: Option<HandPush>,
     /// Seed of the disturbances.
     pub seed: u64,
     /// Integration steps per tick.
@@ -82,6 +85,7 @@ impl Scenario {
             force_noise_n: 0.0,
             torque_noise_n_m: 0.0,
             force_offset_n: 0.0,
+            push: None,
             seed: 1,
             substeps: 4,
             counter_start: 0,

@@ -144,13 +144,22 @@ impl TableValues {
     /// The same table with no thresholds and no limits, so that the supervisor detects nothing: for runs that
     /// show what happens to a rig without a supervisor.
     pub fn without_detection(mut self) -> Self {
-        self.thresholds = supervision::thresholds(None);
+        self = self.without_tests();
         let limits = &mut self.limits;
         (limits.rail_m, limits.angle_rad, limits.speed_m_per_s) = ([-f32::MAX, f32::MAX], f32::MAX, f32::MAX);
         limits.saturated_ticks = u32::MAX;
         if let Some(swing_up) = &mut self.swing_up {
-            swing_up.thresholds = supervision::thresholds(None);
             swing_up.limits = MotionLimits::none();
+        }
+        self
+    }
+
+    /// The same table without the tests of the innovation, but with all limits.
+    #[must_use]
+    pub fn without_tests(mut self) -> Self {
+        self.thresholds = supervision::thresholds(None);
+        if let Some(swing_up) = &mut self.swing_up {
+            swing_up.thresholds = supervision::thresholds(None);
         }
         self
     }

@@ -2,7 +2,7 @@
 //!
 //! [`linear`] examines the linear model: margins, tick, noise, rounding, certificates. The rest runs the firmware's
 //! own controller against nonlinear plants: [`attraction`], [`corners`], [`monte_carlo`], [`noise_run`],
-//! [`coarsest_encoder`], [`imperfections()`].
+//! [`coarsest_encoder`], [`imperfections()`], [`pushes()`].
 //!
 //! ```
 //! use upright_design::design::design;
@@ -31,6 +31,7 @@ mod loop_model;
 mod margins;
 mod monte_carlo;
 mod noise_runs;
+mod pushes;
 mod report;
 mod response;
 mod rounding;
@@ -65,6 +66,7 @@ pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
 pub use monte_carlo::{Effort, MonteCarlo, Spread, WorstCase, monte_carlo, sample, spread, wilson};
 pub use noise_runs::{Endurance, MeasuredRipple, NoiseRun, endurance, noise_run};
+pub use pushes::{PushSearch, PushSurvival, pushes};
 pub use report::{Check, LawTrust, TrustReport, brief, trust};
 pub use response::Response;
 pub use rounding::Rounding;

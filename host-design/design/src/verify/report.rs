@@ -7,8 +7,8 @@ use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, Effort,
     EncoderSettings, ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun,
-    RequiredSurvival, VerifyError, attraction, coarsest_encoder, corners, linear, mass_tolerances,
-    monte_carlo, noise_run, required_imperfections, spread,
+    PushSurvival, RequiredSurvival, VerifyError, attraction, coarsest_encoder, corners, linear,
+    mass_tolerances, monte_carlo, noise_run, pushes, required_imperfections, spread,
 };
 use crate::design::Certified;
 use crate::number::significant;
@@ -33,6 +33,8 @@ pub struct LawTrust {
     pub linear: LinearReport,
     /// Largest tilts and step.
     pub attraction: Option<Attraction>,
+    /// Pushes by hand.
+    pub pushes: Vec<PushSurvival>,
     /// Ripple in simulated runs with noise.
     pub noise_run: Option<NoiseRun>,
     /// The coarsest encoder.
@@ -118,6 +120,7 @@ impl LawTrust {
         Self {
             linear,
             attraction: None,
+            pushes: Vec::new(),
             noise_run: None,
             coarsest_encoder: None,
             corners: None,
@@ -144,6 +147,10 @@ fn law_trust(
     }
     stage("region of attraction");
     trust.attraction = known(attraction(rig, table, law, &AttractionSettings::default()))?;
+    if is_chain {
+        stage("pushes");
+        trust.pushes = known(pushes(rig, table, law))?.unwrap_or_default();
+    }
     stage("noise");
     trust.noise_run = noise(rig, table, law)?;
     if table.observer.is_some() && is_chain {

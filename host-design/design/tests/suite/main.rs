@@ -15,6 +15,7 @@ mod plant_motion;
 mod plant_rigs;
 mod plant_sines;
 mod public_machines;
+mod pushes;
 mod reality_friction;
 mod reality_loop;
 mod rig_errors;

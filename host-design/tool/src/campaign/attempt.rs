@@ -180,7 +180,7 @@ impl DefectRun<'_> {
             observed.outside |= observed.off.is_none()
                 && self.is_outside(tick, harness.begun().first().copied(), harness.bench.state());
             let drive = if acting.enable { acting.drive } else { output.drive };
-            harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
+            self.push(harness, &injection, since);
             harness.bench.tick(drive);
         }
         observed.fault = harness.session.fault();
@@ -192,6 +192,16 @@ impl DefectRun<'_> {
             }
         }
         Ok(observed)
+    }
+
+    /// Pushes the rig in the next tick, `since` ticks after the onset: by hand, or at the cart alone.
+    fn push(&self, harness: &mut Harness<'_>, injection: &Injection<'_>, since: Option<usize>) {
+        let (Some(since), Some(chain)) = (since, self.rig.chain()) else { return };
+        let Some(push) = &self.trial.push else { return harness.bench.push(injection.push_n(since)) };
+        let t = since as f64 * self.rig.tick.period_s;
+        if let Some((force_n, torques_n_m)) = push.in_tick(t, chain, harness.bench.state()) {
+            harness.bench.pull(force_n, &torques_n_m);
+        }
     }
 
     /// Asks a board whose motor went off without a fault why it has restarted.

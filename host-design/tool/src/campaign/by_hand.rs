@@ -59,6 +59,7 @@ impl Trial {
             kind,
             phase: Phase::Balancing,
             scenario: scenario.clone(),
+            push: None,
             onset: 0,
             watched: 0,
             sensor,

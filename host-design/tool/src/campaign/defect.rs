@@ -79,7 +79,7 @@ defects! {
     MotorReversed Nothing "the motor's force has the wrong sign" => Off(5);
     MotorStuck Nothing "the motor produces full force to one side" => Off(5);
     MotorWeak Nothing "the motor produces 10 to 50 % of the force" => Bounded;
-    Push Nothing "a push on the cart for 50 ms, with up to the force limit" => Bounded;
+    Push Nothing "a push by hand for 5 ms to 1 s at the cart or a link, with 0.1 to 0.9 of the force that balancing survives; in other states at the cart for 50 ms, with up to the force limit" => Survived;
     HostSilent Nothing "a host that commands the set-point sends nothing more" => Fault(F::LinkLost, Link);
     HostDeaf Process "the host stops reading the serial line" => Ignored;
     FrameDamaged Nothing "a disarm command with a wrong bit" => Ignored;
@@ -126,6 +126,7 @@ impl Defect {
         let special = match phase {
             Phase::Jogging => self.while_jogging(),
             Phase::Shaken => self.while_shaken(),
+            Phase::Raising | Phase::Lowering if self == Self::Push => Some(Bounded),
             Phase::Balancing | Phase::Raising | Phase::Lowering => None,
         };
         special.unwrap_or_else(|| self.expected())

@@ -21,6 +21,8 @@ pub enum Expected {
     Changed,
     /// Links and cart stay within their limits until the motor is off, if it is turned off at all.
     Bounded,
+    /// Balancing continues, if it does so without the tests of the innovation.
+    Survived,
     /// The firmware refuses to arm, for these reasons at least.
     Refused(Inhibits),
     /// The motor is off in the same tick, and the firmware stops running.

@@ -33,6 +33,8 @@ pub enum Class {
     Missed,
     /// The motor went off although it should have stayed on.
     FalseAlarm,
+    /// Fault detection took a push for a defect: without the tests of the innovation, the rig keeps balancing.
+    Mistaken,
 }
 
 /// The outcome of a trial.
@@ -113,6 +115,10 @@ fn class(
             if without.outputs == observed.outputs { Class::Rejected } else { Class::Missed }
         }
         Expected::Bounded | Expected::Changed if observed.outside => Class::Missed,
+        Expected::Survived if observed.outside => Class::Missed,
+        Expected::Survived if observed.off.is_none() => Class::Rejected,
+        Expected::Survived if stays_on_untested(setup, trial)? => Class::Mistaken,
+        Expected::Survived => Class::Detected,
         Expected::Changed if observed.off.is_none() => Class::Missed,
         Expected::Bounded | Expected::Changed if observed.off.is_some() => Class::Detected,
         Expected::Bounded | Expected::Changed => Class::Masked,
@@ -135,6 +141,13 @@ fn class(
         Expected::Dead if observed.dead && ticks == Some(1) => Class::Detected,
         Expected::Dead => Class::Missed,
     })
+}
+
+/// Whether the motor stays on, on the host, with the limits but without the tests of the innovation.
+fn stays_on_untested(setup: &Setup<'_>, trial: &Trial) -> Result<bool, RunError> {
+    let table = setup.table.clone().without_tests();
+    let setup = Setup { table: &table, place: RunPlace::Host, ..*setup };
+    Ok(attempt(&setup, trial, true)?.off.is_none())
 }
 
 fn of_fault(

@@ -81,7 +81,8 @@ impl Defect {
             | Defect::EncoderReversed
             | Defect::EncodersSwapped
             | Defect::MotorDead
-            | Defect::MotorReversed => Some(Expected::Bounded),
+            | Defect::MotorReversed
+            | Defect::Push => Some(Expected::Bounded),
             Defect::ArmUnhomed
             | Defect::ArmHanging
             | Defect::ArmStopped

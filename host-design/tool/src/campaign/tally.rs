@@ -1,5 +1,7 @@
 //! Many trials in parallel, and their counts by kind.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 
@@ -11,6 +13,7 @@ use super::trial::Trial;
 use crate::in_the_loop::{RunError, RunPlace};
 use upright_design::study::{Study, StudyError};
 use upright_design::table::TableValues;
+use upright_design::verify::VerifyError;
 
 /// A trial that could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +27,14 @@ pub enum CampaignError {
         kind: &'static str,
         /// The cause.
         source: Box<RunError>,
+    },
+    /// The force of a push cannot be found.
+    #[error("trial {number}: {source}")]
+    Push {
+        /// Number of the trial.
+        number: u64,
+        /// The cause.
+        source: VerifyError,
     },
     /// The outcomes of other processes cannot be merged.
     #[error(transparent)]
@@ -53,6 +64,8 @@ pub struct DefectRow {
     pub missed: usize,
     /// See [`Class::FalseAlarm`].
     pub false_alarms: usize,
+    /// See [`Class::Mistaken`]: the names of the faults, and how many trials ended with each.
+    pub mistaken: BTreeMap<&'static str, usize>,
     /// Largest number of ticks to motor off.
     pub worst: Option<u32>,
     /// Largest number of ticks to motor off, counted from the first tick of the defect.
@@ -110,7 +123,9 @@ pub fn one(
 ) -> Result<TrialOutcome, CampaignError> {
     let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
     let trial = match setup.during {
-        During::Balancing => trial,
+        During::Balancing => {
+            trial.pushed(setup.rig, setup.table).map_err(|source| CampaignError::Push { number, source })?
+        }
         During::Jog => trial.in_jog(setup.rig),
         During::Shaking(_) => trial.in_shaking(setup.rig),
     };
@@ -154,6 +169,10 @@ impl DefectRow {
         faults.dedup();
         let name =
             |code: u8| Fault::ALL.iter().find(|entry| entry.fault.code() == code).map(|entry| entry.name);
+        let mut mistaken = BTreeMap::new();
+        for outcome in of_kind().filter(|outcome| outcome.class == Class::Mistaken) {
+            *mistaken.entry(outcome.fault.and_then(name).unwrap_or("none")).or_default() += 1;
+        }
         Self {
             kind,
             meaning: kind.meaning(),
@@ -171,6 +190,7 @@ impl DefectRow {
             late: count(Class::Late),
             missed: count(Class::Missed),
             false_alarms: count(Class::FalseAlarm),
+            mistaken,
             worst: of_kind().filter_map(|outcome| outcome.ticks).max(),
             worst_from_onset: of_kind().filter_map(|outcome| outcome.from_onset).max(),
             stop_to_off_us: of_kind().filter_map(|outcome| outcome.stop_to_off_us).max_by(f64::total_cmp),

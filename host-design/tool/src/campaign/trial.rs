@@ -7,9 +7,9 @@ use upright::table::Law;
 use super::defect::Defect;
 use super::expected::{Expected, Phase};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Sensing};
+use upright_design::simulate::{HandPush, Scenario, Sensing};
 use upright_design::table::{SwingUpValues, TableValues};
-use upright_design::verify::Disturbance;
+use upright_design::verify::{Disturbance, PushSearch, VerifyError};
 
 /// A defect, and the run that it happens in.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Trial {
     pub phase: Phase,
     /// Set-point and disturbances of the run.
     pub scenario: Scenario,
+    /// The push by hand, if the defect is one: its times count from the onset.
+    pub push: Option<HandPush>,
     /// First tick of the defect, counted from the release.
     pub onset: usize,
     /// Ticks of the run from the onset on.
@@ -36,6 +38,12 @@ pub struct Trial {
     pub seed: u64,
 }
 
+/// Shortest and longest push by hand (s), and its smallest and largest force as a share of what balancing survives.
+const PUSH_S: [f64; 2] = [0.005, 1.0];
+const PUSH_SHARES: [f64; 2] = [0.1, 0.9];
+/// Time before a push in the search for that force, and time for which a push is watched after its end (s).
+const SETTLED_S: f64 = 0.2;
+const AFTER_PUSH_S: f64 = 3.0;
 /// Number of ticks within which a command takes effect.
 const COMMAND_TICKS: usize = 4;
 /// Time for which a raised rig balances before it is lowered (s).
@@ -82,6 +90,7 @@ impl Trial {
             kind,
             phase: Phase::Balancing,
             scenario,
+            push: None,
             onset: random.random_range((0.2 * per_second) as usize..(0.7 * per_second) as usize),
             watched: (0.8 * per_second) as usize,
             sensor,
@@ -98,6 +107,31 @@ impl Trial {
             }
             _ => trial,
         }
+    }
+
+    /// The same push with a duration, a place and a share, drawn at random, of the force that balancing from rest
+    /// survives without the tests of the innovation. Other defects, and a rig without a chain, stay as they are.
+    ///
+    /// # Errors
+    /// [`VerifyError`] if a run cannot be started.
+    pub fn pushed(self, rig: &Rig, table: &TableValues) -> Result<Self, VerifyError> {
+        if (self.kind, self.phase) != (Defect::Push, Phase::Balancing) || rig.chain().is_none() {
+            return Ok(self);
+        }
+        let mut random = self.random();
+        let [shortest_s, longest_s] = PUSH_S;
+        let duration_s = shortest_s * (longest_s / shortest_s).powf(random.random());
+        let along = random.random_range(0.5..1.0);
+        let unit = HandPush { body: self.sensor, along, force_n: self.sign, from_s: 0.0, duration_s };
+        let table = table.clone().without_tests();
+        let push = HandPush { from_s: SETTLED_S, ..unit };
+        let search = PushSearch { rig, table: &table, law: self.scenario.law, push, seed: self.seed };
+        let first_n = search.first(true)?.map_or(0.0, |(force_n, _)| force_n);
+        let [least, most] = PUSH_SHARES;
+        let force_n =
+            self.sign * (least + (most - least) * self.size) * first_n / (1.0 + PushSearch::RELATIVE);
+        let watched = ((duration_s + AFTER_PUSH_S) / rig.tick.period_s) as usize;
+        Ok(Self { push: Some(HandPush { force_n, ..unit }), watched, ..self })
     }
 
     /// The same defect while the rig is raised or lowered; `when` (0 to 1) sets how late in the motion.

@@ -132,10 +132,7 @@ impl Planted {
         match self.what {
             What::CartFriction => friction.cart_friction_n = STUCK * f64::from(table.limits.jog_force_n),
             What::JointFriction => {
-                let torque = |link: &Link| {
-                    let centre_m = link.centre_of_mass_m.unwrap_or(0.5 * link.length_m);
-                    HELD * link.mass_kg * centre_m * chain.gravity_m_per_s2
-                };
+                let torque = |link: &Link| HELD * link.mass_kg * link.centre_m() * chain.gravity_m_per_s2;
                 friction.joint_friction_n_m = PerJoint::each(chain.links.iter().map(torque).collect());
             }
             _ => {}

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::error::{BuildError, TARGET};
+use super::error::{BuildError, NoCompiler, TARGET};
 use crate::project::NoCheckout;
 use crate::project::checkout;
 
@@ -47,7 +47,7 @@ pub struct Compiler {
 /// # Errors
 /// [`BuildError::NoCompiler`] if there is none.
 pub fn compiler() -> Result<Compiler, BuildError> {
-    compiler_for(MICROCONTROLLER)?.ok_or(BuildError::NoCompiler)
+    compiler_for(MICROCONTROLLER)
 }
 
 /// The compiler for all of these microcontrollers that is installed, by the names of their targets.
@@ -55,14 +55,17 @@ pub fn compiler() -> Result<Compiler, BuildError> {
 /// # Errors
 /// As for [`compiler`].
 pub fn compiler_for_chips(names: &[&str]) -> Result<Compiler, BuildError> {
-    compiler_for(ForeignTarget { names, ..MICROCONTROLLER })?.ok_or(BuildError::NoCompiler)
+    compiler_for(ForeignTarget { names, ..MICROCONTROLLER })
 }
 
-/// The installed compiler for all of these targets; `None` if there is none.
+/// The installed compiler for all of these targets.
 ///
 /// # Errors
-/// [`NoCheckout`] if there is nothing that it could compile.
-pub(crate) fn compiler_for(target: ForeignTarget<'_>) -> Result<Option<Compiler>, NoCheckout> {
+/// [`NoCompiler`] if there is none; [`NoCheckout`] if there is nothing that it could compile.
+pub(crate) fn compiler_for<E>(target: ForeignTarget<'_>) -> Result<Compiler, E>
+where
+    E: From<NoCompiler> + From<NoCheckout>,
+{
     let target_directory = base_directory()?.join(target.folder);
     let mut compiler = if target.names.iter().all(|name| rustup_has(name)) {
         Compiler {
@@ -86,7 +89,7 @@ pub(crate) fn compiler_for(target: ForeignTarget<'_>) -> Result<Option<Compiler>
             target_directory: target_directory.join("debian"),
         }
     } else {
-        return Ok(None);
+        return Err(NoCompiler(target.names.join(" ")).into());
     };
     // Variables set by an outer cargo are for the host.
     for (name, _) in std::env::vars_os() {
@@ -97,7 +100,7 @@ pub(crate) fn compiler_for(target: ForeignTarget<'_>) -> Result<Option<Compiler>
         }
     }
     compiler.cargo.env("CARGO_TARGET_DIR", &compiler.target_directory).stdin(Stdio::null());
-    Ok(Some(compiler))
+    Ok(compiler)
 }
 
 /// A separate target directory: the caller may run under cargo, which holds a lock on the usual one.

@@ -12,15 +12,19 @@ use crate::project::NoCheckout;
 /// The target that images are compiled for: Cortex-M4 with single-precision floating point.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// No compiler for these targets is installed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "no compiler for {0}: run `rustup target add {0}`, or on Debian `apt-get install lld rustc-web cargo-web rust-web-src`"
+)]
+pub struct NoCompiler(pub(super) String);
+
 /// Why an image could not be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// No compiler for the target.
-    #[error(
-        "no compiler for {TARGET}: run `rustup target add {TARGET}`, or on Debian \
-         `apt-get install lld rustc-web cargo-web rust-web-src`"
-    )]
-    NoCompiler,
+    #[error(transparent)]
+    NoCompiler(#[from] NoCompiler),
     /// The rig has more encoders than the board has timers for.
     #[error("{board} counts {} encoders, and this rig has {needed}: use another board (docs/board.md)", board.encoders())]
     Encoders {

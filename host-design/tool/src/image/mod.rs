@@ -28,7 +28,7 @@ pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler, compiler_for_chips};
 pub(crate) use compiler::{ForeignTarget, compiler_for};
 pub use elf::{ElfError, LinkedImage};
-pub use error::{BuildError, TARGET};
+pub use error::{BuildError, NoCompiler, TARGET};
 pub use facts::{BoardFacts, board_facts};
 pub use forbidden::forbidden_functions;
 pub use pico::{PicoImage, build_pico};

@@ -52,7 +52,7 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
         let (from, to) = (pivot - scale * bottom, pivot - scale * (bottom + link.length_m));
         line(out, [MIDDLE, from], [MIDDLE, to], &curve_colour(index % CHROMATIC), 8.0)?;
         dot(out, [MIDDLE, from], 5.0, "#000000")?;
-        let centre = link.centre_of_mass_m.unwrap_or(0.5 * link.length_m);
+        let centre = link.centre_m();
         let at = pivot - scale * (bottom + centre);
         writeln!(
             out,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::image::NoCompiler;
 use crate::project::NoCheckout;
 
 /// The target of the page's module.
@@ -11,11 +12,8 @@ pub(super) const TARGET: &str = "wasm32-unknown-unknown";
 #[derive(Debug, thiserror::Error)]
 pub enum SiteError {
     /// No compiler for WebAssembly.
-    #[error(
-        "no compiler for {TARGET}: run `rustup target add {TARGET}`, or on Debian \
-         `apt-get install lld rustc-web cargo-web rust-web-src`"
-    )]
-    NoCompiler,
+    #[error(transparent)]
+    NoCompiler(#[from] NoCompiler),
     /// There is no source to build from.
     #[error(transparent)]
     NoCheckout(#[from] NoCheckout),

@@ -20,8 +20,7 @@ const PROFILE: &str = "page";
 /// # Errors
 /// [`SiteError`] if there is no compiler or no source, or if the compiler fails.
 pub fn module() -> Result<Vec<u8>, SiteError> {
-    let Compiler { program, mut cargo, target_directory, .. } =
-        compiler_for(BROWSER)?.ok_or(SiteError::NoCompiler)?;
+    let Compiler { program, mut cargo, target_directory, .. } = compiler_for::<SiteError>(BROWSER)?;
     cargo
         .current_dir(checkout()?)
         .args(["rustc", "--quiet", "--locked", "--package", PACKAGE, "--lib", "--crate-type", "cdylib"])

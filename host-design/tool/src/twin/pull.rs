@@ -1,6 +1,6 @@
 //! A spring between a body of the rig and the pointer.
 
-use upright_design::plant::absolute_angles;
+use upright_design::plant::{absolute_angles, torques_of_force};
 use upright_design::rig::Chain;
 
 /// What is pulled, and where to.
@@ -61,9 +61,6 @@ impl Spring {
     }
 
     /// The pull of `pulled` on the rig in `state` (`x, ẋ, θ_1, θ̇_1, …`).
-    ///
-    /// With the gripped point `p`, the generalised force on a coordinate q is `F · ∂p/∂q` (Goldstein, *Classical
-    /// Mechanics*, §1.4). An absolute angle has `Q_j = τ_j - τ_{j+1}`, so the torques are sums from the last link on.
     pub(super) fn pull(&self, pulled: &PulledPoint, state: &[f64]) -> Pull {
         let angles: Vec<f64> = absolute_angles(state).collect();
         let mut rate = 0.0;
@@ -82,20 +79,16 @@ impl Spring {
             number if number == pulled.body => self.lengths_m[link] * pulled.along.clamp(0.0, 1.0),
             _ => 0.0,
         };
+        let arms_m: Vec<f64> = (0..angles.len()).map(arm).collect();
         let (mut point, mut speed) = ([state[0], 0.0], [state[1], 0.0]);
         for (link, (&phi, &phidot)) in angles.iter().zip(&rates).enumerate() {
             let (sin, cos) = phi.sin_cos();
-            point = [point[0] - arm(link) * sin, point[1] + arm(link) * cos];
-            speed = [speed[0] - arm(link) * cos * phidot, speed[1] - arm(link) * sin * phidot];
+            let arm = arms_m[link];
+            point = [point[0] - arm * sin, point[1] + arm * cos];
+            speed = [speed[0] - arm * cos * phidot, speed[1] - arm * sin * phidot];
         }
         let force_n = self.force(pulled, point, speed);
-        let (mut torques_n_m, mut beyond) = (vec![0.0; angles.len()], 0.0);
-        for (link, &phi) in angles.iter().enumerate().rev() {
-            let (sin, cos) = phi.sin_cos();
-            beyond += -arm(link) * (cos * force_n[0] + sin * force_n[1]);
-            torques_n_m[link] = beyond;
-        }
-        Pull { force_n, cart_n: force_n[0], torques_n_m }
+        Pull { force_n, cart_n: force_n[0], torques_n_m: torques_of_force(&arms_m, force_n, state) }
     }
 
     fn omega(&self) -> f64 {

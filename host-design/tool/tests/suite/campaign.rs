@@ -44,6 +44,22 @@ fn without_detection_every_defect_that_needs_it_is_missed() {
     }
 }
 
+#[test]
+fn a_push_that_balancing_survives_is_a_mistake_of_the_tests_that_turn_it_off() {
+    let (rig, table) = rig_and_table("single-quanser-ip02");
+    let pushes = |table: &TableValues| {
+        let result = run(&on_host(rig, table), &[Defect::Push], 20);
+        result.rows.into_iter().next().unwrap()
+    };
+    let untested = pushes(&table.clone().without_tests());
+    assert!(untested.rejected >= 18 && untested.mistaken.is_empty(), "{untested:?}");
+    // Negative control: tests that raise an alarm at a touch.
+    let mut strict = table.clone();
+    strict.thresholds.innovation.iter_mut().for_each(|threshold| *threshold *= 0.5);
+    let strict = pushes(&strict);
+    assert!(strict.mistaken.get("encoder").is_some_and(|&count| count > 10), "{strict:?}");
+}
+
 /// The kinds of defects that prove something during a jog.
 fn while_jogging(table: &TableValues, place: RunPlace<'_>) -> Vec<Defect> {
     kinds(table, place).into_iter().filter(|kind| kind.while_jogging().is_some()).collect()

@@ -8,7 +8,7 @@ fn stepper() -> String {
 }
 
 #[test]
-fn check_design_and_simulate_serve_a_stepper() {
+fn check_design_simulate_and_export_serve_a_stepper() {
     let rig = stepper();
     let check = upright(&["check", &rig]);
     assert_eq!(status(&check), 0);
@@ -26,6 +26,9 @@ fn check_design_and_simulate_serve_a_stepper() {
     let late = upright(&["simulate", &rig, "--delay", "1"]);
     assert_eq!(status(&late), 2);
     assert!(stderr(&late).contains("--delay 1"), "{}", stderr(&late));
+    let header = folder.path().join("controller.h");
+    assert_eq!(status(&upright(&["export", &rig, "--c", header.to_str().unwrap()])), 0);
+    assert!(std::fs::read_to_string(&header).unwrap().contains("int32_t pulses"));
 }
 
 #[test]
@@ -46,5 +49,4 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
     refused(&["twin", &rig]);
     refused(&["commission", &rig, "--target", "host"]);
     refused(&["identify", &rig, "nothing.log"]);
-    refused(&["export", &rig, "--c", "nothing.h"]);
 }

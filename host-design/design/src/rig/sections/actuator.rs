@@ -37,10 +37,8 @@ const FORCE_LIMIT: &[Key] = &[Key {
     absent: Absent::Follows("no limit"),
 }];
 
-/// Accepted voltages of the dead zone; the section's own code compares them with the supply.
-const DEAD_ZONE: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
-/// Accepted drops, likewise.
-const BRIDGE_DROP: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
+/// Accepted voltages of dead zone and bridge; the section's own code compares them with the supply.
+const BELOW_SUPPLY: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
 const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 
 /// The actuator, `[actuator]`: force limit and motor, or a drive that imposes the cart's acceleration.
@@ -107,9 +105,9 @@ keys! {
         pulley_radius_m: f64, "m", Rule::POSITIVE, "radius of the pulley or pinion", WITH_A_MOTOR;
         supply_v: f64, "V", Rule::POSITIVE, "supply voltage of the motor driver", WITH_A_MOTOR;
         #[serde(skip_serializing_if = "Option::is_none")]
-        bridge_drop_v: Option<f64>, "V", BRIDGE_DROP,
+        bridge_drop_v: Option<f64>, "V", BELOW_SUPPLY,
             "voltage that the transistors of the motor driver lose, about 2 V in an L298N", Absent::Follows("0");
-        dead_zone_v: f64, "V", DEAD_ZONE,
+        dead_zone_v: f64, "V", BELOW_SUPPLY,
             "voltage below which the motor does not move", Absent::Numbers(&[0.0]);
         slew_v_per_s: Option<f64>, "V/s", Rule::POSITIVE,
             "largest rate of change of the motor's voltage", Absent::Follows("no limit");
@@ -216,8 +214,10 @@ fn acceleration(table: &Table<'_>, tick: &Tick) -> Result<AccelerationDrive, Rig
 fn motor(table: &Table<'_>) -> Result<Motor, RigError> {
     let motor = Motor::read(table)?;
     let less_than_supply = |key: &str, volts: f64| match table.get(key) {
-        Some(node) if volts >= motor.supply_v => Err(node
-            .out_of_range(DEAD_ZONE.accepts, &format!("give {}, less than supply_v", table.asks_for(key)))),
+        Some(node) if volts >= motor.supply_v => Err(node.out_of_range(
+            BELOW_SUPPLY.accepts,
+            &format!("give {}, less than supply_v", table.asks_for(key)),
+        )),
         _ => Ok(()),
     };
     less_than_supply("dead_zone_v", motor.dead_zone_v)?;

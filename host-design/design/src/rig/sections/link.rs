@@ -160,8 +160,8 @@ pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64) -> Result<Link, RigEr
 }
 
 impl Link {
-    /// Distance from the joint to the centre of mass (m).
-    fn centre_m(&self) -> f64 {
+    /// Distance from the joint to the centre of mass (m), half the length if not given.
+    pub fn centre_m(&self) -> f64 {
         self.centre_of_mass_m.unwrap_or(0.5 * self.length_m)
     }
 

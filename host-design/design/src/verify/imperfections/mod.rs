@@ -17,6 +17,7 @@ use crate::table::TableValues;
 pub use catalogue::{IMPERFECTIONS, Imperfection};
 use cure::Cures;
 use search::SizeSearch;
+pub(super) use search::first;
 
 pub use survival::{
     Cure, ImperfectionSettings, Imperfections, OfBristle, RequiredSurvival, SizeRuns, Survival,

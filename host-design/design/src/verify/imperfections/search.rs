@@ -177,7 +177,7 @@ impl SizeSearch<'_> {
 /// bisection of the logarithm to within `relative`. None if even the largest holds; the smallest if that does not.
 ///
 /// Small backlash and stiff belts take long to simulate, so the search does not begin with them.
-fn first<E>(
+pub(in crate::verify) fn first<E>(
     [smallest, largest]: [f64; 2],
     start: f64,
     relative: f64,

@@ -2,7 +2,7 @@
 
 use super::quantity::Values::{Each, One};
 use super::quantity::{TrustQuantity, force, is_chain, number, signs};
-use crate::verify::{LawTrust, Outcome};
+use crate::verify::{LawTrust, Outcome, PushSurvival};
 
 pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
@@ -29,6 +29,12 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             let [m, peak] = if is_chain(rig) { [" m", "peak force"] } else { ["", "peak input"] };
             Some(format!("{}{m}{largest}, {peak} {}", number(step.size), force(rig, step.peak_force_n)))
         }),
+    },
+    TrustQuantity {
+        name: "push, ",
+        meaning: "horizontal force at the cart or at the end of a link, for 50 ms and for 0.5 s, from which the controller \
+                  alone falls, from which the firmware turns the motor off, and its fault",
+        values: Each(|_, law| pushes(law)),
     },
     TrustQuantity {
         name: "coarsest encoders",
@@ -90,6 +96,26 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
 /// How a run ended that did not survive; empty for one that did.
 fn end(outcome: &Outcome) -> String {
     outcome.fall.as_ref().map_or(String::new(), |fall| format!("; {fall}"))
+}
+
+/// A row for the cart and for each link, with both durations.
+fn pushes(law: &LawTrust) -> Vec<(String, String)> {
+    let at =
+        |force_n: Option<f64>| force_n.map_or("no force tried".to_owned(), |n| format!("{} N", number(n)));
+    let text = |push: &PushSurvival| {
+        let (falls, off) = (at(push.falls_at_n), at(push.turned_off_at_n));
+        let by = push.ended_by.map_or(String::new(), |kind| format!(" ({kind})"));
+        format!("{} s: falls at {falls}, motor off at {off}{by}", number(push.duration_s))
+    };
+    let of_body = law.pushes.chunk_by(|one, other| one.body == other.body);
+    let row = |pushes: &[PushSurvival]| {
+        let name = match pushes[0].body {
+            0 => "cart".to_owned(),
+            link => format!("end of link {link}"),
+        };
+        (name, pushes.iter().map(text).collect::<Vec<_>>().join("; "))
+    };
+    of_body.map(row).collect()
 }
 
 fn tilts(law: &LawTrust) -> Vec<(String, String)> {

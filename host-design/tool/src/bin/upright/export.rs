@@ -31,7 +31,6 @@ pub(crate) struct ExportCommand {
 impl ExportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("export")?;
         let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
         let header = c_header(&rig, &table).map_err(|error| Failure::of(self.rig.display(), error))?;
         Ok(write_atomically(&self.c, header.as_bytes())?)

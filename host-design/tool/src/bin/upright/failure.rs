@@ -92,8 +92,8 @@ fn exit_status(error: &(dyn Error + 'static)) -> u8 {
         exit_status_of_a_run(error)
     } else if let Some(CampaignError::Trial { source, .. }) = error.downcast_ref() {
         if source.lacks_emulator() { 4 } else { 1 }
-    } else if matches!(error.downcast_ref(), Some(BuildError::NoCompiler))
-        || matches!(error.downcast_ref(), Some(SiteError::NoCompiler))
+    } else if matches!(error.downcast_ref(), Some(BuildError::NoCompiler(_)))
+        || matches!(error.downcast_ref(), Some(SiteError::NoCompiler(_)))
     {
         4
     } else if let Some(stop) = error.downcast_ref() {

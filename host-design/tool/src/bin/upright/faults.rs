@@ -237,6 +237,21 @@ impl FaultsCommand {
     }
 }
 
+/// How many pushes by hand keep balancing, of those that would without the tests of the innovation.
+fn pushes(row: &DefectRow) -> String {
+    let mistaken: usize = row.mistaken.values().sum();
+    if row.rejected + mistaken == 0 {
+        return String::new();
+    }
+    let faults = row.mistaken.iter().map(|(fault, count)| format!("; {count} end with {fault}"));
+    format!(
+        "pushes that are survived without fault detection: {} of {} keep balancing{}\n",
+        row.rejected,
+        row.rejected + mistaken,
+        faults.collect::<String>()
+    )
+}
+
 /// The campaign as a table, a line for each defect.
 fn text(result: &Campaign, control: Option<&Campaign>) -> String {
     let line = |name: &str, numbers: Vec<String>, faults: &str| {
@@ -254,6 +269,7 @@ fn text(result: &Campaign, control: Option<&Campaign>) -> String {
         let numbers = counts.map(|count| count.to_string()).into_iter().chain(ticks).collect();
         text += &line(row.kind.name(), numbers, &row.faults.join(", "));
     }
+    text.extend(result.rows.iter().filter(|row| row.kind == Defect::Push).map(pushes));
     if let Some(us) = result.rows.iter().find_map(|row| row.stop_to_off_us) {
         text += &format!("emergency stop between ticks: PWM inactive at most {us:.3} µs after the edge\n");
     }

@@ -60,6 +60,7 @@ fn made(
     let laws = linear(rig, &certified, &table).unwrap().into_iter().map(|linear| LawTrust {
         linear,
         attraction: None,
+        pushes: Vec::new(),
         noise_run: None,
         coarsest_encoder: None,
         corners: None,
