@@ -191,8 +191,8 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
         let record = wiring.undone(&short);
         let shooting = Shooting { model, record: &record, priors, free: true };
         let fit = shooting.fit_settled(&start, WINDOW_S, ITERATIONS, 1);
-        // Relative to the motion: a factor on the counts must not make residuals small. `max` alone would take a fit that
-        // has diverged for the best of all.
+        // Relative to the motion: a factor on the counts must not make residuals small. With `max` alone, a fit that
+        // has diverged would be the best.
         let of = |(channel, &rms): (usize, &f64)| match rms.is_finite() {
             true => libm::log(rms.max(LEAST_RMS * record.steps[channel]) / record.extent(channel)[1]),
             false => f64::INFINITY,
