@@ -14,6 +14,7 @@ mod in_the_loop;
 mod integral;
 mod lost_loops;
 mod own_board;
+mod pico;
 mod plain_equations;
 mod rig_fuzz;
 mod verdicts;

@@ -101,8 +101,7 @@ pub fn identify_recordings(
         free::known(rig, model.layout, &mut priors, record.is_clamped);
     }
     if is_driven && !settings.trust_wiring {
-        progress(ProgressStep::Begin("wiring", wiring::count(record.channels)));
-        let wiring = wiring::find(&model, &record, &priors, &|| progress(ProgressStep::Done));
+        let wiring = wiring::find(&model, &record, &priors, progress);
         found.wiring = Some(wiring.clone());
         if !wiring.is_as_in_file() {
             found.refusal = Some(Refusal::Wiring(wiring));

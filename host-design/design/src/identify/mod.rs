@@ -77,5 +77,5 @@ pub use recordings::Recordings;
 pub use table::{AngleReference, AngleZero, Reading, RecordingError, RecordingTable};
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use window_errors::{ChannelError, WindowErrors};
-pub use wiring::{WiringFault, WiringFound};
+pub use wiring::{Wiring, WiringFault, WiringFound};
 pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};

@@ -59,12 +59,18 @@ pub enum Refusal {
 impl core::fmt::Display for Refusal {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Refusal::Wiring(found) => write!(
-                f,
-                "{} (residuals {:.1} times smaller than as wired, {:.1} times smaller than with any other fault); then record \
-                 again",
-                found.best, found.file_is_worse_by, found.margin
-            ),
+            Refusal::Wiring(found) => {
+                write!(
+                    f,
+                    "{} (residuals {:.1} times smaller than as wired, {:.1} times smaller than with any other fault); then \
+                     record again",
+                    found.best, found.file_is_worse_by, found.margin
+                )?;
+                if found.is_ambiguous() {
+                    write!(f, "; it may also be this: {}", found.second)?;
+                }
+                Ok(())
+            }
             Refusal::Misfit(reason) | Refusal::NotPhysical(reason) => f.write_str(reason),
         }
     }

@@ -5,22 +5,30 @@ use super::model::Model;
 use super::parameters::Prior;
 use super::record::Record;
 use super::shooting::{Shooting, WINDOW_S};
-use crate::parallel;
+use crate::number::significant;
+use crate::parallel::{self, Progress, ProgressStep};
 
 /// Begin and end of the part of the log that is used (s).
 const TIME_S: [f64; 2] = [0.5, 5.0];
 /// Iterations for each wiring.
 const ITERATIONS: usize = 4;
 /// Wrong counts per turn that are tried.
-const FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
+const FACTORS: [f64; 6] = [0.25, 1.0 / 3.0, 0.5, 2.0, 3.0, 4.0];
 /// A wiring other than that of the file is believed when the residuals are smaller by this factor.
 const MARGIN: f64 = 2.0;
 
-/// A wiring. Channels are cart (0) and joints.
+/// Residuals below this share of a step of the encoder are no better.
+const LEAST_RMS: f64 = 0.2;
+/// A wiring explains the log if its residuals are less than so many times the least.
+const EXPLAINED: f64 = 3.0;
+/// If the best one, other than that of the file, does not explain it, a fault is added to so many of the best ones, so
+/// often.
+const BEAM: usize = 4;
+const ROUNDS: usize = 2;
+
+/// A fault of the wiring. Channels are cart (0) and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WiringFault {
-    /// As in the file.
-    AsInFile,
     /// The motor turns the other way.
     MotorReversed,
     /// An encoder counts the other way.
@@ -31,11 +39,26 @@ pub enum WiringFault {
     Counts(usize, f64),
 }
 
+/// A wiring: its faults, none if it is that of the file.
+///
+/// A machine seen from behind is the same machine: with all encoders and the motor reversed it moves as before. So
+/// a set of reversed encoders cannot be told from the others and the motor. Here the motor is reversed only where all
+/// encoders would have to be.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Wiring {
+    /// What is wrong.
+    pub faults: Vec<WiringFault>,
+    /// Number of channels.
+    pub channels: usize,
+}
+
 /// Result of the wiring check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WiringFound {
     /// The wiring that explains the log best.
-    pub best: WiringFault,
+    pub best: Wiring,
+    /// The one that explains it second best.
+    pub second: Wiring,
     /// Factor by which the residuals of the second-best wiring are larger (geometric mean over the channels).
     pub margin: f64,
     /// Factor by which the residuals of the file's wiring are larger; 1 if it is the best.
@@ -45,14 +68,18 @@ pub struct WiringFound {
 impl WiringFound {
     /// Whether the wiring is taken to be that of the file: no other explains the log clearly better.
     pub fn is_as_in_file(&self) -> bool {
-        self.best == WiringFault::AsInFile || self.file_is_worse_by < MARGIN
+        self.best.faults.is_empty() || self.file_is_worse_by < MARGIN
+    }
+
+    /// Whether the second-best wiring may be the right one, too.
+    pub fn is_ambiguous(&self) -> bool {
+        self.margin < MARGIN
     }
 }
 
 impl core::fmt::Display for WiringFault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
-            WiringFault::AsInFile => write!(f, "as in the file"),
             WiringFault::MotorReversed => write!(f, "the motor is reversed: exchange its two wires"),
             WiringFault::Reversed(channel) => {
                 write!(
@@ -66,25 +93,80 @@ impl core::fmt::Display for WiringFault {
             }
             WiringFault::Counts(channel, factor) => write!(
                 f,
-                "the encoder of {} gives {factor} times the counts of the file: correct its resolution in the file",
-                channel_name(channel)
+                "the encoder of {} gives {} times the counts of the file: correct its resolution in the file",
+                channel_name(channel),
+                significant(factor, 3)
             ),
         }
     }
 }
 
-/// The record as it would have been with the wiring of the file, if it was recorded with `wiring`.
-fn undone(record: &Record, wiring: WiringFault) -> Record {
-    match wiring {
-        WiringFault::AsInFile => record.clone(),
-        WiringFault::MotorReversed => record.reversed(),
-        WiringFault::Reversed(channel) => record.rewired(|row| scaled(row, channel, -1.0)),
-        WiringFault::Counts(channel, factor) => record.rewired(|row| scaled(row, channel, 1.0 / factor)),
-        WiringFault::Swapped(one, other) => record.rewired(|row| {
-            let mut row = row.to_vec();
-            row.swap(one, other);
-            row
-        }),
+impl core::fmt::Display for Wiring {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.faults.is_empty() {
+            return f.write_str("as in the file");
+        }
+        let faults: Vec<String> = self.faults.iter().map(ToString::to_string).collect();
+        f.write_str(&faults.join("; "))?;
+        let reversed = self.reversed();
+        if reversed.len() > 1 {
+            let others = (0..self.channels).filter(|channel| !reversed.contains(channel)).map(channel_name);
+            let others: Vec<String> = others.chain(["the motor".to_owned()]).collect();
+            write!(f, " (or else reverse all others: {})", others.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+impl Wiring {
+    fn with(&self, fault: WiringFault) -> Self {
+        let faults = self.faults.iter().copied().chain([fault]).collect();
+        Self { faults, channels: self.channels }
+    }
+
+    /// The channels whose encoders are reversed.
+    fn reversed(&self) -> Vec<usize> {
+        let channel = |fault: &WiringFault| match *fault {
+            WiringFault::Reversed(channel) => Some(channel),
+            _ => None,
+        };
+        self.faults.iter().filter_map(channel).collect()
+    }
+
+    /// The record as it would have been with the wiring of the file, if it was recorded with this one.
+    fn undone(&self, record: &Record) -> Record {
+        self.faults.iter().rev().fold(record.clone(), |record, &fault| match fault {
+            WiringFault::MotorReversed => record.reversed(),
+            WiringFault::Reversed(channel) => record.rewired(|row| scaled(row, channel, -1.0)),
+            WiringFault::Counts(channel, factor) => record.rewired(|row| scaled(row, channel, 1.0 / factor)),
+            WiringFault::Swapped(one, other) => record.rewired(|row| {
+                let mut row = row.to_vec();
+                row.swap(one, other);
+                row
+            }),
+        })
+    }
+
+    /// Every combination of reversed encoders and motor, as in the file first.
+    fn signs(channels: usize) -> Vec<Self> {
+        let of = |set: usize| {
+            let reversed = (0..channels).filter(|channel| set >> channel & 1 == 1);
+            let faults = match set.count_ones() as usize == channels {
+                true => vec![WiringFault::MotorReversed],
+                false => reversed.map(WiringFault::Reversed).collect(),
+            };
+            Self { faults, channels }
+        };
+        (0..1 << channels).map(of).collect()
+    }
+
+    /// This wiring with one more fault that is no sign.
+    fn with_another(&self) -> Vec<Self> {
+        let pairs = (1..self.channels)
+            .flat_map(|one| (one + 1..self.channels).map(move |other| WiringFault::Swapped(one, other)));
+        let counts =
+            (0..self.channels).flat_map(|channel| FACTORS.map(|factor| WiringFault::Counts(channel, factor)));
+        pairs.chain(counts).map(|fault| self.with(fault)).collect()
     }
 }
 
@@ -94,51 +176,57 @@ fn scaled(row: &[f64], channel: usize, factor: f64) -> Vec<f64> {
     row
 }
 
-/// All wirings that are tried, that of the file first.
-fn wirings(channels: usize) -> Vec<WiringFault> {
-    let mut all = vec![WiringFault::AsInFile, WiringFault::MotorReversed];
-    all.extend((0..channels).map(WiringFault::Reversed));
-    for one in 1..channels {
-        all.extend((one + 1..channels).map(|other| WiringFault::Swapped(one, other)));
-    }
-    all.extend((0..channels).flat_map(|channel| FACTORS.map(|factor| WiringFault::Counts(channel, factor))));
-    all
+/// The wirings that are tried first, that of the file before all others.
+fn wirings(channels: usize) -> Vec<Wiring> {
+    let file = Wiring { faults: Vec::new(), channels };
+    Wiring::signs(channels).into_iter().chain(file.with_another()).collect()
 }
 
-/// Fits a few iterations with each wiring; calls `progress` after each.
-pub(super) fn find(
-    model: &Model,
-    record: &Record,
-    priors: &[Prior],
-    progress: &(dyn Fn() + Sync),
-) -> WiringFound {
+/// Fits a few iterations with each wiring.
+pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: Progress<'_>) -> WiringFound {
     let short = record.part(TIME_S[0], TIME_S[1]);
     let short = if short.pieces.is_empty() { record.clone() } else { short };
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-    let all = wirings(record.channels);
-    let score = |&wiring: &WiringFault| {
-        let record = undone(&short, wiring);
+    let score = |wiring: &Wiring| {
+        let record = wiring.undone(&short);
         let shooting = Shooting { model, record: &record, priors, free: true };
         let fit = shooting.fit_settled(&start, WINDOW_S, ITERATIONS, 1);
-        // Relative to the motion: a factor on the counts must not make residuals small.
-        let of = |(channel, rms): (usize, &f64)| {
-            libm::log(rms.max(0.2 * record.steps[channel]) / record.extent(channel)[1])
+        // Relative to the motion: a factor on the counts must not make residuals small. With `max` alone, a fit that
+        // has diverged would be the best.
+        let of = |(channel, &rms): (usize, &f64)| match rms.is_finite() {
+            true => libm::log(rms.max(LEAST_RMS * record.steps[channel]) / record.extent(channel)[1]),
+            false => f64::INFINITY,
         };
         let score = fit.rms.iter().enumerate().map(of).sum::<f64>() / record.channels as f64;
-        progress();
-        (if score.is_nan() { f64::INFINITY } else { score }, wiring)
+        progress(ProgressStep::Done);
+        (score, wiring.clone())
     };
-    let mut scores = parallel::map(&all, score);
+    let first = wirings(record.channels);
+    progress(ProgressStep::Begin("wiring", first.len() as u64));
+    let mut scores = parallel::map(&first, score);
     let of_file = scores[0].0;
-    scores.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let sort = |scores: &mut Vec<(f64, Wiring)>| scores.sort_by(|one, other| one.0.total_cmp(&other.0));
+    sort(&mut scores);
+    for _ in 0..ROUNDS {
+        if scores[0].1.faults.is_empty() || scores[0].0 < libm::log(EXPLAINED) + least(&short) {
+            break;
+        }
+        let more: Vec<Wiring> =
+            scores.iter().take(BEAM).flat_map(|(_, wiring)| wiring.with_another()).collect();
+        progress(ProgressStep::Begin("more faults of the wiring", more.len() as u64));
+        scores.extend(parallel::map(&more, score));
+        sort(&mut scores);
+    }
     WiringFound {
-        best: scores[0].1,
+        best: scores[0].1.clone(),
+        second: scores[1].1.clone(),
         margin: libm::exp(scores[1].0 - scores[0].0),
         file_is_worse_by: libm::exp(of_file - scores[0].0),
     }
 }
 
-/// Number of wirings that are tried for this many channels.
-pub(super) fn count(channels: usize) -> u64 {
-    wirings(channels).len() as u64
+/// The score of the least residuals.
+fn least(record: &Record) -> f64 {
+    let of = |channel: usize| libm::log(LEAST_RMS * record.steps[channel] / record.extent(channel)[1]);
+    (0..record.channels).map(of).sum::<f64>() / record.channels as f64
 }

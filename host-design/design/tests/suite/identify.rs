@@ -105,13 +105,18 @@ fn faults_of_the_wiring_are_named() {
     let file = rig("");
     let first = |log: &Log| {
         let found = run(&file, log, &Settings::default()).unwrap();
-        (found.wiring.unwrap().best, found.refusal, found.estimates.len())
+        (found.wiring.unwrap().best.faults, found.refusal, found.estimates.len())
     };
-    let faults: [(WiringFault, Log); 4] = [
-        (WiringFault::Reversed(2), rewired(log(), |row| row[2] = -row[2])),
-        (WiringFault::Swapped(1, 2), rewired(log(), |row| row.swap(1, 2))),
-        (WiringFault::Counts(1, 2.0), rewired(log(), |row| row[1] *= 2)),
-        (WiringFault::MotorReversed, rewired(log(), |row| row.iter_mut().for_each(|count| *count = -*count))),
+    use WiringFault::{Counts, MotorReversed, Reversed, Swapped};
+    let faults: [(&[WiringFault], Log); 5] = [
+        (&[Swapped(1, 2)], rewired(log(), |row| row.swap(1, 2))),
+        (&[Counts(2, 3.0)], rewired(log(), |row| row[2] *= 3)),
+        (&[MotorReversed], rewired(log(), |row| row.iter_mut().for_each(|count| *count = -*count))),
+        (
+            &[Reversed(1), Reversed(2)],
+            rewired(log(), |row| row[1..].iter_mut().for_each(|count| *count = -*count)),
+        ),
+        (&[Reversed(2), Counts(1, 2.0)], rewired(log(), |row| [row[1], row[2]] = [2 * row[1], -row[2]])),
     ];
     for (wiring, log) in faults {
         let (best, refusal, estimates) = first(&log);

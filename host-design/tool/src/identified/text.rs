@@ -209,7 +209,7 @@ pub fn json(rig: &str, found: &Identification) -> Value {
         .collect();
     let wiring = found.wiring.as_ref().map(|wiring| {
         json!({
-            "best": wiring.best.to_string(), "as_in_file": wiring.is_as_in_file(), "margin": wiring.margin,
+            "best": wiring.best.to_string(), "second": wiring.second.to_string(), "as_in_file": wiring.is_as_in_file(), "margin": wiring.margin,
             "file_is_worse_by": wiring.file_is_worse_by,
         })
     });

@@ -90,7 +90,7 @@ fn check_board(kind: ImageKind, needed: usize, tick_s: f64) -> Result<(), BuildE
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler
 /// writes all images to the same place, and each has to be copied from there before the next is compiled.
-fn one_at_a_time() -> Result<File, BuildError> {
+pub(super) fn one_at_a_time() -> Result<File, BuildError> {
     let path = images()?.join("compiling");
     let locked = File::create(&path).and_then(|file| file.lock().map(|()| file));
     locked.map_err(|source| BuildError::File { path, source })
@@ -135,7 +135,7 @@ fn compile(kind: ImageKind, gains: Option<&Path>, name: &str) -> Result<PathBuf,
 }
 
 /// Directory in which images are kept; it is created if it does not exist.
-fn images() -> Result<PathBuf, BuildError> {
+pub(super) fn images() -> Result<PathBuf, BuildError> {
     let directory = target_directory()?.join("images");
     match std::fs::create_dir_all(&directory) {
         Ok(()) => Ok(directory),

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use upright_design::table::WriteError;
 
 use super::board::BoardName;
+use super::elf::ElfError;
+use super::pico_limits::PicoError;
 use crate::project::NoCheckout;
 
 /// The target that images are compiled for: Cortex-M4 with single-precision floating point.
@@ -42,6 +44,12 @@ pub enum BuildError {
         /// The rig's tick (s).
         tick_s: f64,
     },
+    /// A Pico cannot run the rig.
+    #[error(transparent)]
+    Pico(#[from] PicoError),
+    /// The image cannot be read.
+    #[error(transparent)]
+    Elf(#[from] ElfError),
     /// There is no source to build from.
     #[error(transparent)]
     NoCheckout(#[from] NoCheckout),

@@ -1,6 +1,7 @@
 //! The boards as a list of facts.
 
 use super::board::BoardName;
+use super::pico_limits::{PICO_ENCODERS, PICO_TICK_S};
 
 /// A board that there is an image for.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -24,15 +25,23 @@ const REAL: &str = "real board: none yet";
 
 /// All boards; the first one is the default.
 pub fn board_facts() -> Vec<BoardFacts> {
-    let facts = |board: BoardName| BoardFacts {
+    let f4 = BoardName::ALL.map(|board| BoardFacts {
         name: board.name(),
         product: board.product(),
         chip: &board.chip()[..9],
         encoders: board.encoders(),
         tick_s: board.tick_s(),
         executed: vec!["virtual board", REAL],
+    });
+    let pico = BoardFacts {
+        name: "pico",
+        product: "Raspberry Pi Pico",
+        chip: "RP2040",
+        encoders: PICO_ENCODERS,
+        tick_s: PICO_TICK_S,
+        executed: vec!["rp2040js 1.4.1", REAL],
     };
-    BoardName::ALL.map(facts).into()
+    f4.into_iter().chain([pico]).collect()
 }
 
 #[cfg(test)]

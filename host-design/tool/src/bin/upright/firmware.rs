@@ -5,6 +5,7 @@ mod boards;
 mod build;
 mod built;
 mod cycles;
+mod drive;
 mod flash;
 mod monitor;
 mod run;

@@ -101,6 +101,8 @@ pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certif
 pub(crate) enum Wanted {
     /// Raising and lowering, if they are stored and were made for these values of the rig file.
     SwingUp,
+    /// None, even if they are stored.
+    Nothing,
     /// Also those between other equilibria, which must be stored.
     Transitions,
 }
@@ -119,6 +121,9 @@ pub(crate) fn with_stored_motions(
     table: TableValues,
     wanted: Wanted,
 ) -> Result<TableValues, Failure> {
+    if wanted == Wanted::Nothing {
+        return Ok(table);
+    }
     let failed = |source| Failure::of(&rig.name, source);
     let stored = match Stored::beside(rig_file) {
         Ok(stored) => stored,
@@ -126,7 +131,7 @@ pub(crate) fn with_stored_motions(
         Err(error) => return Err(failed(error)),
     };
     let others = match wanted {
-        Wanted::SwingUp => Vec::new(),
+        Wanted::Nothing | Wanted::SwingUp => Vec::new(),
         Wanted::Transitions => {
             StoredTransitions::beside(rig_file).and_then(|stored| stored.transitions(rig)).map_err(failed)?
         }

@@ -9,3 +9,58 @@ pub(super) struct BoardOption {
     #[arg(long, value_name = "NAME", default_value_t = BoardName::WeactF405)]
     pub(super) board: BoardName,
 }
+
+/// Every board that there is an image for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum AnyBoard {
+    /// A board that the virtual board stands for.
+    F4(BoardName),
+    /// The Raspberry Pi Pico.
+    Pico,
+}
+
+/// Name of the Pico on the command line.
+pub(super) const PICO: &str = "pico";
+
+impl std::str::FromStr for AnyBoard {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        match name.parse() {
+            _ if name == PICO => Ok(Self::Pico),
+            Ok(board) => Ok(Self::F4(board)),
+            Err(error) => Err(format!("{error}, {PICO}")),
+        }
+    }
+}
+
+impl std::fmt::Display for AnyBoard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::F4(board) => board.fmt(f),
+            Self::Pico => f.pad(PICO),
+        }
+    }
+}
+
+#[derive(Args)]
+pub(super) struct AnyBoardOption {
+    /// Board: a name that `upright firmware boards` lists
+    #[arg(long, value_name = "NAME", default_value_t = AnyBoard::F4(BoardName::WeactF405))]
+    pub(super) board: AnyBoard,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_board_is_known_by_the_name_that_it_prints() {
+        let f4 = BoardName::ALL.map(AnyBoard::F4);
+        for board in f4.into_iter().chain([AnyBoard::Pico]) {
+            assert_eq!(board.to_string().parse(), Ok(board));
+        }
+        let refused = "picot".parse::<AnyBoard>().unwrap_err();
+        assert!(refused.contains("nucleo-f446, pico"), "{refused}");
+    }
+}

@@ -32,7 +32,8 @@ fn table(facts: &[BoardFacts]) -> String {
         "board", "product", "chip", "encoders", "tick", "executed"
     );
     for BoardFacts { name, product, chip, encoders, tick_s: [shortest_s, longest_s], executed } in facts {
-        let tick = format!("{} to {} ms", shortest_s * 1e3, longest_s * 1e3);
+        let ms = |time_s: &f64| (time_s * 1e6).round() / 1e3;
+        let tick = format!("{} to {} ms", ms(shortest_s), ms(longest_s));
         text += &format!(
             "{name:<15} {product:<27} {chip:<10} {encoders:>8}  {tick:<16} {}\n",
             executed.join("; ")

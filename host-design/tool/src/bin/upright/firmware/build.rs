@@ -6,14 +6,15 @@ use std::path::PathBuf;
 use clap::Args;
 use upright_tool::image::ImageKind;
 
-use super::board::BoardOption;
-use super::built::built;
+use super::board::{AnyBoard, AnyBoardOption};
+use super::built::{built, built_for_pico};
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 use crate::variation::Wanted;
 
 /// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
-/// tick takes longer than a quarter of its period.
+/// tick takes longer than a quarter of its period. For a Pico, it prints the path of the UF2 file, beside which the ELF
+/// file is, and does not run it.
 ///
 /// Uses the compiler of rustup if its target thumbv7em-none-eabihf is installed, otherwise that of Debian. If there is
 /// neither, the exit status is 4, and the message says what to install.
@@ -22,22 +23,32 @@ use crate::variation::Wanted;
 Examples:
   upright firmware build                                      with src/gains.rs as it is
   upright firmware build rigs/single-quanser-ip02.toml        with the gains and stored motions of a rig
-  upright firmware build --board nucleo-f446")]
+  upright firmware build --board nucleo-f446
+  upright firmware build rigs/single-quanser-ip02.toml --board pico")]
 pub(crate) struct BuildCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
-    on: BoardOption,
+    on: AnyBoardOption,
     /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
+    /// Leave the stored motions out
+    #[arg(long, requires = "rig", conflicts_with = "transitions")]
+    no_motions: bool,
 }
 
 impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let image =
-            built(ImageKind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
-        check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
+        let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::of(self.transitions) };
+        let image = match self.on.board {
+            AnyBoard::Pico => built_for_pico(self.rig.as_deref(), wanted)?.uf2,
+            AnyBoard::F4(board) => {
+                let image = built(ImageKind::Board(board), self.rig.as_deref(), wanted)?;
+                check_ticks(board, self.rig.as_deref(), wanted, &image)?;
+                image
+            }
+        };
         writeln!(std::io::stdout(), "{}", image.display())?;
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, ImageKind};
+use upright_tool::image::{self, ImageKind, PicoImage};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -17,6 +17,15 @@ pub(super) fn built(kind: ImageKind, rig: Option<&Path>, wanted: Wanted) -> Resu
     };
     let (rig, table) = designed(path, wanted)?;
     Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
+}
+
+/// Builds the image for a Pico.
+pub(super) fn built_for_pico(rig: Option<&Path>, wanted: Wanted) -> Result<PicoImage, Failure> {
+    let Some(path) = rig else {
+        return Err(Failure::argument("name a rig file: an image for a pico is built from one"));
+    };
+    let (rig, table) = designed(path, wanted)?;
+    Ok(with_spinner("building the image", || image::build_pico(&rig, &table))?)
 }
 
 /// Reads this rig file and designs its table, with the stored motions.

@@ -6,16 +6,17 @@ use std::process::Command;
 use clap::Args;
 use upright_tool::image::ImageKind;
 
-use super::board::BoardOption;
-use super::built::built;
+use super::board::{AnyBoard, AnyBoardOption};
+use super::built::{built, built_for_pico};
 use super::cycles::check_ticks;
+use super::drive::copy_to_drive;
 use crate::failure::Failure;
 use crate::variation::Wanted;
 
 const PROBE_RS: &str = "probe-rs";
 
 /// Builds and checks the image of a board as `build` does, writes it to the board with probe-rs, verifies it, and
-/// starts it.
+/// starts it. For a Pico, it copies the image to the drive that appears while BOOTSEL is held at power-on.
 ///
 /// The firmware starts disarmed: the motor stays off.
 #[derive(Args)]
@@ -27,25 +28,34 @@ pub(crate) struct FlashCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
-    on: BoardOption,
+    on: AnyBoardOption,
     /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
+    /// Leave the stored motions out
+    #[arg(long, requires = "rig", conflicts_with = "transitions")]
+    no_motions: bool,
 }
 
 impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::of(self.transitions) };
+        let board = match self.on.board {
+            AnyBoard::Pico => {
+                return copy_to_drive(&built_for_pico(self.rig.as_deref(), wanted)?.uf2);
+            }
+            AnyBoard::F4(board) => board,
+        };
         // Checked first, because building the image takes longer.
         if Command::new(PROBE_RS).arg("--version").output().is_err() {
             return Err(Failure::no_program(
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image =
-            built(ImageKind::Board(self.on.board), self.rig.as_deref(), Wanted::of(self.transitions))?;
-        check_ticks(self.on.board, self.rig.as_deref(), Wanted::of(self.transitions), &image)?;
-        probe_rs(&["download", "--verify", "--chip", self.on.board.chip()], Some(&image))?;
-        probe_rs(&["reset", "--chip", self.on.board.chip()], None)
+        let image = built(ImageKind::Board(board), self.rig.as_deref(), wanted)?;
+        check_ticks(board, self.rig.as_deref(), wanted, &image)?;
+        probe_rs(&["download", "--verify", "--chip", board.chip()], Some(&image))?;
+        probe_rs(&["reset", "--chip", board.chip()], None)
     }
 }
 

@@ -1,0 +1,8 @@
+//! Tells the linker its script.
+
+fn main() {
+    let folder = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
+    println!("cargo::rustc-link-arg=-T{folder}/image.x");
+    println!("cargo::rustc-link-arg=--nmagic");
+    println!("cargo::rerun-if-changed=image.x");
+}

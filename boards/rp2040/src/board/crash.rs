@@ -1,0 +1,70 @@
+//! What ends the program: panics and faults of the processor. They turn the motor off, and are recorded in the scratch
+//! registers of the watchdog, which survive its reset (4.7).
+
+use core::panic::PanicInfo;
+
+use cortex_m_rt::{ExceptionFrame, exception};
+use rp2040_hal::pac::WATCHDOG;
+use upright::protocol::message::{CrashRecord, Reset, Start};
+use upright::table::checksum::crc32;
+
+/// Mark of a crash that caused the last reset, and of an older one.
+const NEW: u32 = 0x5afe_2040;
+const OLD: u32 = 0x5afe_2041;
+
+unsafe extern "C" {
+    static __sdata: u32;
+    static __edata: u32;
+    static __sidata: u32;
+}
+
+/// Why the program started, and the record of the last crash since power-on.
+pub(super) fn start(watchdog: &WATCHDOG) -> Start {
+    let mark = watchdog.scratch0().read().bits();
+    let record = [watchdog.scratch1().read().bits(), watchdog.scratch2().read().bits(), 0, 0, 0];
+    if mark == NEW {
+        // SAFETY: any value.
+        watchdog.scratch0().write(|w| unsafe { w.bits(OLD) });
+    }
+    let was_watchdog = watchdog.reason().read().bits() & 1 != 0;
+    let reset = match (was_watchdog, mark) {
+        (true, NEW) => Reset::Software,
+        (true, _) => Reset::Watchdog,
+        _ => Reset::Power,
+    };
+    let crash = matches!(mark, NEW | OLD).then_some(CrashRecord(record));
+    Start { reset, crash, image: image_checksum() }
+}
+
+/// CRC-32 of the image in flash.
+fn image_checksum() -> u32 {
+    const FLASH: usize = 0x1000_0000;
+    // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
+    unsafe {
+        let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
+        let end = (&raw const __sidata) as usize + values;
+        crc32(0, core::slice::from_raw_parts(FLASH as *const u8, end - FLASH))
+    }
+}
+
+fn record(pc: u32, lr: u32) {
+    // SAFETY: nothing else runs any more.
+    unsafe {
+        let watchdog = &*WATCHDOG::PTR;
+        watchdog.scratch1().write(|w| w.bits(pc));
+        watchdog.scratch2().write(|w| w.bits(lr));
+        watchdog.scratch0().write(|w| w.bits(NEW));
+    }
+}
+
+#[panic_handler]
+fn panicked(_: &PanicInfo) -> ! {
+    record(0, 0);
+    super::stop()
+}
+
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    record(frame.pc(), frame.lr());
+    super::stop()
+}

@@ -1,0 +1,197 @@
+//! The board: the only code that accesses registers, and the only code with `unsafe`. Sections and tables are those of
+//! the RP2040 datasheet.
+
+#![allow(unsafe_code)]
+
+mod crash;
+mod encoders;
+mod guard;
+mod motor;
+mod pins;
+mod state_machine;
+mod supply;
+mod usb;
+
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{NVIC, SYST};
+use rp2040_hal::clocks::init_clocks_and_plls;
+use rp2040_hal::fugit::MicrosDurationU32;
+use rp2040_hal::pac::{Interrupt, Peripherals};
+use rp2040_hal::watchdog::Watchdog;
+use upright::board::{Board, Contacts, Inputs, Output};
+use upright::control::encoder::CounterWidth;
+use upright::gains::SENSORS;
+use upright::protocol::message::Start;
+
+use crate::CYCLES_PER_TICK;
+use encoders::Encoders;
+use motor::Motor;
+use supply::Supply;
+pub(crate) use usb::{UsbLine as SerialLine, UsbMemory};
+
+/// Processor clock (Hz).
+pub(crate) const CLOCK_HZ: u32 = 125_000_000;
+
+/// Shortest and longest tick (µs): a shorter one leaves no time for a controller, and SysTick has 24 bits.
+pub(crate) const TICK_US: [u32; 2] = [500, 100_000];
+
+/// Crystal of the Pico (Hz).
+const CRYSTAL_HZ: u32 = 12_000_000;
+
+/// The second stage of the boot loader: it makes the flash readable.
+#[unsafe(link_section = ".boot2")]
+#[used]
+static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
+
+/// The pins and peripherals of the control task.
+pub(crate) struct Hardware {
+    encoders: Encoders,
+    motor: Motor,
+    supply: Supply,
+    watchdog: Watchdog,
+    /// Ticks of the timer that were over before the tick had ended.
+    wraps: u32,
+    overrun: bool,
+    /// Number of ticks in a row that ended after the next one was due.
+    late_ticks: u8,
+    /// Whether the limit switches were open at the end of the previous tick.
+    limits: [bool; 2],
+}
+
+/// Sets up all peripherals but the watchdog, with the motor off. Also returns what the board knows about the start.
+pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Hardware, SerialLine, Start) {
+    let start = crash::start(&device.WATCHDOG);
+    let mut resets = device.RESETS;
+    pins::set_up(&resets, &device.PADS_BANK0, &device.IO_BANK0);
+    let mut watchdog = Watchdog::new(device.WATCHDOG);
+    let Ok(clocks) = init_clocks_and_plls(
+        CRYSTAL_HZ,
+        device.XOSC,
+        device.CLOCKS,
+        device.PLL_SYS,
+        device.PLL_USB,
+        &mut resets,
+        &mut watchdog,
+    ) else {
+        stop()
+    };
+    let encoders = Encoders::set_up(&device.PIO0, &device.PIO1);
+    let motor = Motor::set_up(&device.PWM, guard::Guard::set_up(device.PIO1));
+    let supply = Supply::set_up(device.ADC);
+    let bus = usb::bus(device.USBCTRL_REGS, device.USBCTRL_DPRAM, clocks.usb_clock, &mut resets);
+    let Some(line) = SerialLine::set_up(bus, memory) else { stop() };
+    let _ = pins::was_reported();
+    pins::set_status_led(true);
+    let hardware = Hardware {
+        encoders,
+        motor,
+        supply,
+        watchdog,
+        wraps: 0,
+        overrun: false,
+        late_ticks: 0,
+        limits: [false; 2],
+    };
+    (hardware, line, start)
+}
+
+impl Hardware {
+    /// Starts the watchdog: three ticks and a tenth of a millisecond. Everything has to be ready for the first tick.
+    pub(crate) fn start_watchdog(&mut self) {
+        self.watchdog.start(MicrosDurationU32::micros(3 * (CYCLES_PER_TICK / (CLOCK_HZ / 1_000_000)) + 100));
+    }
+}
+
+impl Board<SENSORS> for Hardware {
+    const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
+
+    fn inputs(&mut self) -> Inputs<SENSORS> {
+        // Clears the flag of the current tick.
+        let _ = tick_is_due();
+        let raw_counts = self.encoders.raw_counts();
+        let [limit_low, limit_high] = pins::limits();
+        let [was_low, was_high] = self.limits;
+        let [was_stopped, was_faulty] = pins::was_reported();
+        Inputs {
+            raw_counts,
+            supply_v: self.supply.volts(),
+            contacts: Contacts {
+                // A contact counts only if it was open at the end of the previous tick, too: a spike that a wire picks
+                // up from the switching bridge must not trip.
+                limit_low: limit_low & was_low,
+                limit_high: limit_high & was_high,
+                emergency_stop: was_stopped,
+                driver_fault: was_faulty,
+                overrun: self.overrun,
+                clock_fault: false,
+                board_fault: self.encoders.have_stopped() | self.motor.has_failed(),
+            },
+        }
+    }
+
+    fn tick_s(&self) -> f32 {
+        CYCLES_PER_TICK as f32 / CLOCK_HZ as f32
+    }
+
+    fn drive(&mut self, output: &Output) {
+        self.motor.drive(output);
+    }
+
+    /// Does not feed the watchdog after three late ticks in a row, which are a fault.
+    fn feed_watchdog(&mut self) {
+        self.limits = pins::limits();
+        self.overrun = tick_is_due();
+        self.wraps = self.wraps.wrapping_add(self.overrun.into());
+        self.late_ticks = if self.overrun { self.late_ticks.saturating_add(1) } else { 0 };
+        if self.late_ticks < 3 {
+            self.watchdog.feed();
+        }
+    }
+
+    /// From the tick's timer, which counts down.
+    fn cycles(&self) -> u32 {
+        let elapsed = CYCLES_PER_TICK.wrapping_sub(SYST::get_current());
+        self.wraps.wrapping_mul(CYCLES_PER_TICK).wrapping_add(elapsed)
+    }
+}
+
+/// Starts the tick: an interrupt every `cycles` of the core clock.
+pub(crate) fn start_ticks(mut timer: SYST, cycles: u32) {
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload(cycles - 1);
+    timer.clear_current();
+    timer.enable_interrupt();
+    timer.enable_counter();
+}
+
+/// Whether the tick timer has wrapped since the last call.
+fn tick_is_due() -> bool {
+    // SAFETY: after start-up, only the control task reads this register; reading it clears the flag.
+    unsafe { (*SYST::PTR).csr.read() & 1 << 16 != 0 }
+}
+
+/// Keeps the bus from interrupting again before it has been served.
+pub(crate) fn mask_bus() {
+    NVIC::mask(Interrupt::USBCTRL_IRQ);
+}
+
+/// Waits for the next interrupt. An interrupt that comes before the wait ends it at once.
+pub(crate) fn wait_for_interrupt() {
+    cortex_m::interrupt::disable();
+    // SAFETY: interrupts are enabled again below; the bus's handler only masks itself.
+    unsafe {
+        NVIC::unmask(Interrupt::USBCTRL_IRQ);
+        cortex_m::asm::wfi();
+        cortex_m::interrupt::enable();
+    }
+}
+
+/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller.
+fn stop() -> ! {
+    cortex_m::interrupt::disable();
+    motor::off();
+    pins::set_status_led(false);
+    loop {
+        cortex_m::asm::nop();
+    }
+}

@@ -1,0 +1,89 @@
+//! The firmware image for the Raspberry Pi Pico: tasks and their priorities.
+//!
+//! | task | started by | priority | does |
+//! |---|---|---|---|
+//! | `tick` | SysTick, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
+//! | `idle` | every interrupt | lowest | bytes → commands, telemetry → bytes |
+//!
+//! The tasks share no locked resource, only single-producer, single-consumer queues.
+
+#![no_std]
+#![no_main]
+
+mod board;
+
+use upright::gains;
+
+/// Processor cycles per tick, at the period for which the gains were designed.
+const CYCLES_PER_TICK: u32 = {
+    let tick_us = (gains::TICK_S as f64 * 1e6 + 0.5) as u32;
+    let [shortest, longest] = board::TICK_US;
+    assert!(tick_us >= shortest && tick_us <= longest, "tick.period_s: the board cannot make this tick");
+    (gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5) as u32
+};
+
+#[rtic::app(device = rp2040_hal::pac, peripherals = true)]
+mod app {
+    use heapless::spsc::Queue;
+    use upright::board::Board;
+    use upright::firmware::Firmware;
+    use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
+    use upright::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
+    use upright::protocol::message::{Command, Message};
+    use upright::protocol::serial_link::SerialLink;
+
+    use crate::board::{Hardware, SerialLine, UsbMemory, set_up, start_ticks};
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct TaskState {
+        control: ControlTask<'static, 'static, Hardware, STATES, SENSORS, SwingUp>,
+        link: SerialLink<'static, STATES, SENSORS>,
+        line: SerialLine,
+    }
+
+    #[init(local = [
+        commands: Queue<Command, COMMANDS> = Queue::new(),
+        messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
+        memory: UsbMemory = UsbMemory::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, TaskState) {
+        let (hardware, line, start) = set_up(cx.device, cx.local.memory);
+        let (to_control, commands) = cx.local.commands.split();
+        let (messages, to_link) = cx.local.messages.split();
+        let firmware = Firmware::new(&TABLE, &SWING_UP, Hardware::WIDTHS, start);
+        let mut control = ControlTask::new(firmware, hardware, commands, messages);
+        control.board().start_watchdog();
+        start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);
+        (Shared {}, TaskState { control, link: SerialLink::new(to_control, to_link), line })
+    }
+
+    #[task(binds = SysTick, priority = 3, local = [control])]
+    fn tick(cx: tick::Context) {
+        cx.local.control.tick();
+    }
+
+    /// Only wakes the background task, which then serves the bus.
+    #[task(binds = USBCTRL_IRQ, priority = 1)]
+    fn bus(_: bus::Context) {
+        crate::board::mask_bus();
+    }
+
+    #[idle(local = [link, line])]
+    fn idle(cx: idle::Context) -> ! {
+        loop {
+            cx.local.line.serve();
+            while let Some(byte) = cx.local.line.read() {
+                cx.local.link.receive(byte);
+            }
+            while cx.local.line.is_free()
+                && let Some(frame) = cx.local.link.transmit()
+            {
+                cx.local.line.write(frame);
+            }
+            crate::board::wait_for_interrupt();
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! What a Raspberry Pi Pico can do.
+
+/// Processor clock (Hz).
+const CLOCK_HZ: f64 = 125e6;
+/// Encoders that it counts.
+pub const PICO_ENCODERS: usize = 5;
+/// Shortest and longest tick (s).
+pub const PICO_TICK_S: [f64; 2] = [0.000_5, 0.1];
+
+/// Longest tick in cycles while a rig of one to four links balances, as measured in the emulator.
+pub const PICO_BALANCING_CYCLES: [u32; 4] = [24_500, 34_500, 50_000, 65_000];
+/// The same while it follows a motion.
+pub const PICO_MOTION_CYCLES: [u32; 4] = [57_000, 94_000, 137_000, 188_000];
+/// Largest share of a period that a tick may take (%).
+const MOST_PERCENT: f64 = 75.0;
+
+/// Why a Pico cannot run a rig.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum PicoError {
+    /// Too many encoders.
+    #[error(
+        "pico counts {PICO_ENCODERS} encoders, and this rig has {0}: use another board (`upright firmware boards`)"
+    )]
+    Encoders(usize),
+    /// A tick that it cannot make.
+    #[error("pico makes ticks of 0.5 to 100 ms, and this rig's is {} ms: change tick.period_s", .0 * 1e3)]
+    Tick(f64),
+    /// A tick that takes too long.
+    #[error(
+        "a tick {what} takes up to {cycles} cycles on a pico, {:.2} ms at 125 MHz: {:.0} % of this rig's {} ms, and {MOST_PERCENT} % \
+         is the most: {remedy}",
+        f64::from(*cycles) / CLOCK_HZ * 1e3, f64::from(*cycles) / CLOCK_HZ / tick_s * 1e2, tick_s * 1e3
+    )]
+    Cycles {
+        /// What the firmware does in it.
+        what: &'static str,
+        /// Cycles of the longest tick.
+        cycles: u32,
+        /// The rig's tick (s).
+        tick_s: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+/// Checks what a Pico can do before the compiler is started.
+pub(super) fn check(sensors: usize, tick_s: f64, has_motions: bool) -> Result<(), PicoError> {
+    if sensors > PICO_ENCODERS {
+        return Err(PicoError::Encoders(sensors));
+    }
+    if !(PICO_TICK_S[0] * (1.0 - 1e-6)..=PICO_TICK_S[1] * (1.0 + 1e-6)).contains(&tick_s) {
+        return Err(PicoError::Tick(tick_s));
+    }
+    let links = sensors.saturating_sub(2).min(PICO_BALANCING_CYCLES.len() - 1);
+    let fits = |cycles: u32| f64::from(cycles) <= CLOCK_HZ * tick_s * MOST_PERCENT / 1e2;
+    let (balancing, motion) = (PICO_BALANCING_CYCLES[links], PICO_MOTION_CYCLES[links]);
+    if !fits(balancing) {
+        let remedy = "make tick.period_s longer, or use another board";
+        return Err(PicoError::Cycles { what: "that balances", cycles: balancing, tick_s, remedy });
+    }
+    if has_motions && !fits(motion) {
+        let remedy = "make tick.period_s longer, use another board, or leave the motions out (--no-motions)";
+        return Err(PicoError::Cycles { what: "that follows a motion", cycles: motion, tick_s, remedy });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn the_guide_has_the_cycles_that_the_check_uses() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let guide = std::fs::read_to_string(Path::new(root).join("docs/pico.md")).unwrap();
+        for links in 0..4 {
+            let cell = |cycles: u32| {
+                let ms = f64::from(cycles) / CLOCK_HZ * 1e3;
+                format!("{},{:03} cycles, {ms:.2} ms", cycles / 1000, cycles % 1000)
+            };
+            let (balancing, motion) = (PICO_BALANCING_CYCLES[links], PICO_MOTION_CYCLES[links]);
+            let row = format!("| {} | {} | {} |", links + 1, cell(balancing), cell(motion));
+            assert!(guide.contains(&row), "docs/pico.md: {row}");
+        }
+    }
+
+    #[test]
+    fn what_a_pico_cannot_do_is_refused_with_the_numbers() {
+        assert_eq!(check(5, 1e-3, false), Ok(()));
+        assert_eq!(check(2, 2e-3, true), Ok(()));
+        let refused = |sensors, tick_s, motions| check(sensors, tick_s, motions).unwrap_err().to_string();
+        assert!(refused(6, 1e-3, false).contains("counts 5 encoders"));
+        assert!(refused(2, 2e-4, false).contains("0.5 to 100 ms"));
+        let four_links = refused(5, 1e-3, true);
+        assert!(four_links.contains("188000 cycles") && four_links.contains("150 %"), "{four_links}");
+        assert!(four_links.contains("--no-motions"), "{four_links}");
+        assert!(refused(5, 6e-4, false).contains("that balances"));
+    }
+}

@@ -1,0 +1,125 @@
+//! The emulated chip: `boards/rp2040/harness/replay.mjs`.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+use serde_json::{Value, json};
+
+use super::recorded::{Recorded, steps};
+use crate::equipment::if_possible;
+use upright_design::rig::Rig;
+use upright_design::table::TableValues;
+use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::repository;
+use upright_tool::image::build_pico;
+
+/// The outputs of the chip after a tick, and what it has sent since the tick before.
+pub(super) struct Answer {
+    pub(super) level: u32,
+    pub(super) positive: bool,
+    pub(super) enabled: bool,
+    pub(super) cycles: u32,
+    /// The most stack in use so far (bytes).
+    pub(super) stack: u32,
+    pub(super) sent: Vec<u8>,
+}
+
+/// The emulator with an image.
+pub(super) struct Chip {
+    process: Child,
+    answers: BufReader<ChildStdout>,
+}
+
+fn harness() -> PathBuf {
+    repository().join("boards/rp2040/harness")
+}
+
+/// The image for this rig, if the compiler and the emulator are there.
+pub(super) fn uf2_with_motions(rig: &Rig, table: &TableValues) -> Option<PathBuf> {
+    let has_emulator = harness().join("node_modules/rp2040js").is_dir();
+    assert!(has_emulator || !is_required("UPRIGHT_REQUIRE_PICO"), "run `npm ci` in boards/rp2040/harness");
+    if !has_emulator {
+        not_exercised("the image for a Pico: run `npm ci` in boards/rp2040/harness");
+        return None;
+    }
+    Some(if_possible(build_pico(rig, table), "the image for a Pico")?.uf2)
+}
+
+impl Chip {
+    pub(super) fn start(uf2: &Path, encoders: usize) -> Self {
+        let mut node = Command::new("node");
+        node.current_dir(harness()).arg("replay.mjs").arg(uf2).arg(encoders.to_string());
+        let mut process = node.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let answers = BufReader::new(process.stdout.take().unwrap());
+        Self { process, answers }
+    }
+
+    /// Sends a line and takes the answer.
+    fn ask(&mut self, line: &Value) -> Value {
+        writeln!(self.process.stdin.as_mut().unwrap(), "{line}").unwrap();
+        let mut answer = String::new();
+        self.answers.read_line(&mut answer).unwrap();
+        serde_json::from_str(&answer).unwrap_or_else(|error| panic!("{error}: {answer}"))
+    }
+
+    /// Runs the ticks of a recorded run.
+    pub(super) fn replay(&mut self, run: &Recorded) -> Vec<Answer> {
+        let hexadecimal =
+            |bytes: &[u8]| bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
+        // The host's counters have 32 and 16 bits, the chip's have 32.
+        let mut counts: Vec<i64> = Vec::new();
+        let mut last: Vec<u32> = Vec::new();
+        let ticks = run.pins.iter().map(|pins| {
+            if last.is_empty() {
+                (counts, last) = (vec![0; pins.raw_counts.len()], pins.raw_counts.to_vec());
+            }
+            for (place, (&now, before)) in pins.raw_counts.iter().zip(&mut last).enumerate() {
+                let moved = now.wrapping_sub(*before);
+                counts[place] +=
+                    if place == 0 { i64::from(moved as i32) } else { i64::from(moved as u16 as i16) };
+                *before = now;
+            }
+            json!({
+                "counts": counts,
+                "limitLow": pins.contacts.limit_low,
+                "limitHigh": pins.contacts.limit_high,
+                "stop": pins.contacts.emergency_stop,
+                "fault": pins.contacts.driver_fault,
+                "supply": steps(pins.supply_v),
+                "received": hexadecimal(&pins.received),
+            })
+        });
+        let ticks: Vec<Value> = ticks.collect();
+        ticks.iter().map(|tick| answer(&self.ask(tick))).collect()
+    }
+
+    /// Stops the chip's ticks; returns the cycles until the power stage is disabled, and until the watchdog resets the
+    /// chip.
+    pub(super) fn stop_ticks(&mut self, limit: u32) -> [u32; 2] {
+        let stopped = self.ask(&json!({ "stopTicks": limit }));
+        ["disabled", "reset"].map(|name| stopped[name].as_u64().unwrap_or_else(|| panic!("{stopped}")) as u32)
+    }
+}
+
+fn answer(object: &Value) -> Answer {
+    let number = |name: &str| object[name].as_u64().unwrap() as u32;
+    let flag = |name: &str| object[name].as_bool().unwrap();
+    let digits = object["sent"].as_str().unwrap().as_bytes();
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    Answer {
+        level: number("level"),
+        positive: flag("positive"),
+        enabled: flag("enabled"),
+        cycles: number("cycles"),
+        stack: number("stack"),
+        sent: digits.chunks(2).map(byte).collect(),
+    }
+}
+
+impl Drop for Chip {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}

@@ -1,0 +1,154 @@
+//! The very UF2 file for a Raspberry Pi Pico, in the emulator rp2040js: all outputs and telemetry are the host's.
+//!
+//! It needs node and the emulator (`npm ci` in `boards/rp2040/harness`), and takes a minute: it runs with `--ignored`.
+
+mod chip;
+mod recorded;
+
+use self::chip::{Answer, Chip, uf2_with_motions};
+use self::recorded::{PERIOD, Recorded, WARM_UP_TICKS, recorded};
+use crate::published::{rig_and_table, rig_and_table_with_motions};
+use upright::board::Output;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+use upright_design::harness::Pins;
+use upright_design::simulate::Scenario;
+use upright_design::swing_up::up_and_down;
+use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
+
+/// Stack of the image (bytes), as `boards/rp2040/image.x` has it.
+const STACK: u32 = 8192;
+
+/// The first tick in which the chip's outputs are not those of the host; `None` if all are.
+fn first_difference(run: &Recorded, answers: &[Answer]) -> Option<usize> {
+    run.outputs.iter().zip(answers).position(|(output, answer)| {
+        let level = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
+        let wanted_level = if output.enable { level.min(PERIOD - PERIOD / 50) } else { 0 };
+        let is_direction = !output.enable || answer.positive == (output.duty > 0.0);
+        (answer.level, answer.enabled) != (wanted_level, output.enable) || !is_direction
+    })
+}
+
+/// Checks outputs and telemetry; returns the largest number of cycles of a tick with the motor on.
+fn assert_equal(run: &Recorded, answers: &[Answer]) -> u32 {
+    assert_eq!(answers.len(), run.outputs.len());
+    assert_eq!(first_difference(run, answers), None, "first tick with other outputs");
+    let sent: Vec<u8> = answers.iter().flat_map(|answer| answer.sent.iter().copied()).collect();
+    let (mut host, chip) = (recorded::telemetry(&run.sent.concat()), recorded::telemetry(&sent));
+    // What the chip sends before it is made known to the bus is lost.
+    host.retain(|message| message.tick >= chip[0].tick);
+    assert!((chip[0].tick as usize) < WARM_UP_TICKS);
+    assert!(chip.len() + 2 >= host.len() && host.len() > 1000, "{} of {} messages", chip.len(), host.len());
+    let different = host.iter().zip(&chip).position(|(host, chip)| host != chip);
+    assert_eq!(different, None, "first different telemetry");
+    let on: Vec<u32> = run
+        .outputs
+        .iter()
+        .zip(answers)
+        .filter(|(output, _)| output.enable)
+        .map(|(_, answer)| answer.cycles)
+        .collect();
+    let mean = on.iter().map(|&cycles| f64::from(cycles)).sum::<f64>() / on.len() as f64;
+    let most = on.iter().copied().max().unwrap();
+    let stack = answers.last().unwrap().stack;
+    println!(
+        "{} ticks, {} with the motor on: {mean:.0} cycles, at most {most}; {stack} bytes of stack",
+        answers.len(),
+        on.len()
+    );
+    assert!(stack < STACK / 2, "{stack} bytes of stack");
+    most
+}
+
+/// Balances from a small lean, after homing, sign check and motor test.
+fn by_hand(rig: &upright_design::rig::Rig, duration_s: f64) -> Scenario {
+    let mut scenario = Scenario { duration_s, ..Scenario::at_rest(rig, Law::Lqr) };
+    scenario.start[2] = 0.002;
+    scenario
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn one_link_is_raised_and_balanced_until_the_emergency_stop() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let scenario = up_and_down(rig, table, 0.5).unwrap();
+    let press = |pins: &mut Pins| pins.contacts.emergency_stop = true;
+    let mut run = recorded(rig, table, &scenario, Some((State::Balancing, 100, press)));
+    run.cut_after_stop();
+    let mut chip = Chip::start(&uf2, table.sensors());
+    let answers = chip.replay(&run);
+    let most = assert_equal(&run, &answers);
+    assert!(most <= PICO_MOTION_CYCLES[0], "{most} cycles");
+    // Negative control: the comparison notices one step of the duty.
+    let changed = run.outputs.iter_mut().rev().find(|output| output.enable).unwrap();
+    *changed = Output { duty: changed.duty + 1.0 / PERIOD as f32, ..*changed };
+    assert!(first_difference(&run, &answers).is_some());
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn a_flood_on_the_bus_disturbs_nothing_and_the_motor_goes_off_when_ticks_stop() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let mut number = 1_u8;
+    let flood = move |pins: &mut Pins| {
+        while pins.received.len() < 60 {
+            number = number.wrapping_mul(5).wrapping_add(3);
+            let _ = pins.received.push(number | 1);
+        }
+        // The next command begins after the end of a frame.
+        let _ = pins.received.push(0);
+    };
+    let mut run = recorded(rig, table, &by_hand(rig, 0.4), Some((State::Jogging, 0, flood)));
+    run.truncate(run.last_on() - 10);
+    assert_eq!(run.last_state(), State::Balancing, "no command got through");
+    let mut chip = Chip::start(&uf2, table.sensors());
+    let most = assert_equal(&run, &chip.replay(&run));
+    assert!(most <= PICO_BALANCING_CYCLES[0], "{most} cycles");
+    let tick = (rig.tick.period_s * 125e6) as u32;
+    let [disabled, reset] = chip.stop_ticks(5 * tick);
+    println!("ticks stopped: disabled after {disabled} cycles, reset after {reset}");
+    assert!((tick..=3 * tick).contains(&disabled) && (2 * tick..=4 * tick).contains(&reset));
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn four_links_balance_in_half_of_the_period_until_an_encoder_wire_breaks() {
+    let (rig, table) = rig_and_table("quadruple-paper");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let mut last = None;
+    let freeze = move |pins: &mut Pins| pins.raw_counts[1] = *last.get_or_insert(pins.raw_counts[1]);
+    let mut run = recorded(rig, table, &by_hand(rig, 1.0), Some((State::Balancing, 300, freeze)));
+    run.cut_after_stop();
+    let answers = Chip::start(&uf2, table.sensors()).replay(&run);
+    let most = assert_equal(&run, &answers);
+    assert!(run.outputs.last().is_some_and(|output| !output.enable), "the broken wire was not noticed");
+    assert!(
+        most <= PICO_BALANCING_CYCLES[3] && most < 68_750,
+        "{most} cycles: at most 55 % of a millisecond"
+    );
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn a_changed_table_keeps_the_motor_off() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let run = recorded(rig, table, &by_hand(rig, 0.1), None::<(State, usize, fn(&mut Pins))>);
+    let mut bytes = std::fs::read(&uf2).unwrap();
+    let gain = table.laws.lqr.as_ref().unwrap().k[0].to_le_bytes();
+    let at = bytes.windows(4).position(|window| window == gain).unwrap();
+    bytes[at] ^= 1;
+    let folder = tempfile::tempdir().unwrap();
+    let changed = folder.path().join("changed.uf2");
+    std::fs::write(&changed, bytes).unwrap();
+    let mut short = run;
+    short.truncate(WARM_UP_TICKS + 200);
+    let answers = Chip::start(&changed, table.sensors()).replay(&short);
+    let sent: Vec<u8> = answers.iter().flat_map(|answer| answer.sent.iter().copied()).collect();
+    let telemetry = recorded::telemetry(&sent);
+    assert!(!telemetry.is_empty() && answers.iter().all(|answer| !answer.enabled));
+    let table_fault = Some(upright::supervision::fault::Fault::Table);
+    assert!(telemetry.iter().all(|at| at.fault == table_fault), "{:?}", telemetry[0].fault);
+}

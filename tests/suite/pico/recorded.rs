@@ -1,0 +1,128 @@
+//! Runs of the firmware on the host, recorded as what the wires of a Pico carry.
+
+use std::time::Duration;
+
+use upright::board::Output;
+use upright::supervision::supervisor::State;
+use upright_design::client::{AnyTelemetry, Client, Received};
+use upright_design::harness::{HarnessError, Pace, Pins, Target, healthy, record, with_firmware};
+use upright_design::rig::Rig;
+use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
+
+/// Clocks of a PWM period of the chip.
+pub(super) const PERIOD: u32 = 6250;
+/// Ticks before the host sends anything: the chip is made known to the bus.
+pub(super) const WARM_UP_TICKS: usize = 60;
+/// Volts of the supply per step of the chip's converter.
+const VOLTS_PER_STEP: f32 = 3.3 * 11.0 / 4096.0;
+
+/// A recorded run.
+pub(super) struct Recorded {
+    pub(super) pins: Vec<Pins>,
+    pub(super) outputs: Vec<Output>,
+    /// What the firmware has sent, by the tick in which it had been sent.
+    pub(super) sent: Vec<Vec<u8>>,
+}
+
+impl Recorded {
+    /// Leaves out what comes 50 ticks after the motor has gone off for good.
+    pub(super) fn cut_after_stop(&mut self) {
+        self.truncate(self.last_on() + 50);
+    }
+
+    /// The last tick with the motor on.
+    pub(super) fn last_on(&self) -> usize {
+        self.outputs.iter().rposition(|output| output.enable).unwrap()
+    }
+
+    /// Leaves out everything from a tick on.
+    pub(super) fn truncate(&mut self, ticks: usize) {
+        self.pins.truncate(ticks);
+        self.outputs.truncate(ticks);
+        self.sent.truncate(ticks);
+    }
+
+    /// The state in the last telemetry.
+    pub(super) fn last_state(&self) -> State {
+        telemetry(&self.sent.concat()).last().unwrap().state
+    }
+}
+
+/// The firmware, with its wires tapped. A defect changes what is on them, from that many ticks after the first one in
+/// its state.
+struct Tap<'a, D> {
+    target: &'a mut dyn Target,
+    defect: Option<(State, usize, D)>,
+    client: Client,
+    since: Option<usize>,
+    run: Recorded,
+}
+
+impl<D: FnMut(&mut Pins)> Target for Tap<'_, D> {
+    fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError> {
+        let mut pins = pins.clone();
+        pins.supply_v = steps(pins.supply_v) as f32 * VOLTS_PER_STEP;
+        self.since = self.since.map(|ticks| ticks + 1);
+        if let Some((_, from, change)) = &mut self.defect
+            && self.since >= Some(*from)
+        {
+            change(&mut pins);
+        }
+        let begin = serial.len();
+        let output = self.target.tick(&pins, serial)?;
+        for &byte in &serial[begin..] {
+            if let Some(Received::Telemetry(telemetry)) = self.client.receive(byte, Duration::ZERO)
+                && self.defect.as_ref().is_some_and(|defect| defect.0 == telemetry.state)
+            {
+                self.since = self.since.or(Some(0));
+            }
+        }
+        self.run.sent.push(serial[begin..].to_vec());
+        self.run.pins.push(pins);
+        self.run.outputs.push(output);
+        Ok(output)
+    }
+
+    fn pace(&self) -> Pace {
+        self.target.pace()
+    }
+}
+
+/// What the chip's converter reads at this voltage.
+pub(super) fn steps(supply_v: f32) -> u32 {
+    (supply_v / VOLTS_PER_STEP).round() as u32
+}
+
+/// Records a scenario; the defect begins that many ticks after the first one in a state.
+pub(super) fn recorded<D: FnMut(&mut Pins)>(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    defect: Option<(State, usize, D)>,
+) -> Recorded {
+    let run = Recorded { pins: Vec::new(), outputs: Vec::new(), sent: Vec::new() };
+    with_firmware(table, |target| {
+        let mut tap = Tap { target, defect, client: Client::default(), since: None, run };
+        let supply_v = table.motor.map_or(0.0, |motor| motor.supply_v);
+        let hanging = healthy(&vec![0; table.sensors()], supply_v);
+        for _ in 0..WARM_UP_TICKS {
+            tap.tick(&hanging, &mut Vec::new()).unwrap();
+        }
+        // Ends early if the defect ends it.
+        let _ = record(rig, table, scenario, &mut tap);
+        tap.run
+    })
+    .unwrap()
+}
+
+/// The telemetry in what was sent, without the cycles, which the host does not count.
+pub(super) fn telemetry(sent: &[u8]) -> Vec<AnyTelemetry> {
+    let mut client = Client::default();
+    let messages = sent.iter().filter_map(|&byte| client.receive(byte, Duration::ZERO));
+    let telemetry = messages.filter_map(|message| match message {
+        Received::Telemetry(telemetry) => Some(AnyTelemetry { cycles: 0, worst_cycles: 0, ..telemetry }),
+        _ => None,
+    });
+    telemetry.collect()
+}
