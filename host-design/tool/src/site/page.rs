@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::motions::packed;
-use super::twin::TwinPage;
+use super::twin::{TwinPage, bare};
 use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 
 const PAGE: &str = include_str!("page/desk.html");
@@ -42,7 +42,7 @@ pub struct Example {
 pub fn page(module: &[u8], examples: &[Example]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
-    let script = format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat());
+    let script = bare(&format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat()));
     let twin = TwinPage::new();
     // A document inside the page has its policy.
     let policy = format!(
@@ -58,7 +58,7 @@ pub fn page(module: &[u8], examples: &[Example]) -> String {
         ("{policy}", policy),
         ("{style}", style),
         ("{examples}", embedded(&shown)),
-        ("{worker}", embedded(&WORKER)),
+        ("{worker}", embedded(&bare(WORKER))),
         ("{twin}", embedded(&twin.html)),
         ("{theme}", embedded(&page_theme())),
         ("{motions}", base64(&compress_to_vec_zlib(&knots, COMPRESSION))),

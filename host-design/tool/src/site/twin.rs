@@ -21,7 +21,7 @@ impl TwinPage {
     pub(super) fn new() -> Self {
         let style = [style_sheet().as_str(), COLOURS_CSS, file("page.css")].concat();
         let modules: String = MODULES.iter().map(|name| module(name, file(name))).collect();
-        let script = format!("'use strict';\nconst modules = {{}};\n{modules}");
+        let script = bare(&format!("'use strict';\nconst modules = {{}};\n{modules}"));
         let is_apart =
             |line: &&str| line.starts_with("<link rel=\"stylesheet\"") || line.starts_with("<script");
         let (mut html, mut is_styled) = (String::new(), false);
@@ -39,6 +39,12 @@ impl TwinPage {
         let html = html.replace("</body>", &format!("<script>{script}</script>\n</body>"));
         Self { html, style, script }
     }
+}
+
+/// A script without its comments and indentation, which a page need not carry.
+pub(super) fn bare(script: &str) -> String {
+    let lines = script.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
+    lines.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// The content of a file of the twin's page.
