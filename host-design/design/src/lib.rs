@@ -15,7 +15,9 @@
 //! | [`export`] | gain table | the controller as a C header |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
 //! | [`client`] | bytes of a serial line | commands with their answers, telemetry, logs |
+//! | [`conversation`] | what a person asks for, telemetry | requests with their answers, in words |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
+//! | [`defects`] | a kind of defect | changed inputs and outputs of the firmware, and the outcome it must have |
 //! | [`identify`] | logs of a machine under excitation | its parameters, with standard deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
@@ -27,6 +29,8 @@
 #![forbid(unsafe_code)]
 
 pub mod client;
+pub mod conversation;
+pub mod defects;
 pub mod design;
 pub mod export;
 pub mod harness;

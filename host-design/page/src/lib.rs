@@ -7,6 +7,7 @@
 //! | `question.rs`, `refusal.rs` | what a page asks, and why there may be no answer |
 //! | `sketch.rs`, `designed.rs` | what it shows of a rig, and of its design |
 //! | `fingerprint.rs` | checksums of tables and of 100 000 ticks of the firmware, to compare machines |
+//! | `twin/` | a rig that a person can pull, change and break |
 //! | `exported.rs` | the functions that a browser calls, the only ones with names of their own in the module |
 
 #![deny(unsafe_code)]
@@ -18,6 +19,7 @@ mod fingerprint;
 mod question;
 mod refusal;
 mod sketch;
+pub mod twin;
 
 pub use fingerprint::{Fingerprint, FingerprintError, PullRounding, TICKS};
 pub use question::Desk;

@@ -10,11 +10,11 @@ use upright_design::table::gains_source;
 
 use crate::designed::{DeskDesign, ShownRun};
 use crate::fingerprint::{Fingerprint, PullRounding};
-use crate::refusal::PageRefusal;
+use crate::refusal::{PageRefusal, failed};
 use crate::sketch;
 
 /// Name under which errors speak of the rig file; a page shows them without it.
-const FILE: &str = "rig.toml";
+pub(crate) const FILE: &str = "rig.toml";
 
 /// A question about a rig: the text of its file, and what is wanted.
 #[derive(Debug, Deserialize)]
@@ -59,15 +59,7 @@ impl Desk {
         let answer = serde_json::from_str(question)
             .map_err(PageRefusal::from)
             .and_then(|question| self.answered(&question));
-        let answer = answer.unwrap_or_else(|refusal| {
-            let place = match &refusal {
-                PageRefusal::Rig(error) => error.place,
-                _ => None,
-            };
-            let (line, column) = (place.map(|place| place.line), place.map(|place| place.column));
-            json!({ "failed": { "why": refusal.to_string(), "line": line, "column": column } })
-        });
-        answer.to_string()
+        answer.unwrap_or_else(|refusal| failed(&refusal)).to_string()
     }
 
     fn answered(&mut self, question: &Question) -> Result<Value, PageRefusal> {

@@ -1,8 +1,10 @@
 //! Why a question has no answer.
 
+use serde_json::{Value, json};
 use upright_design::design::DesignError;
 use upright_design::export::NoHeader;
-use upright_design::rig::RigError;
+use upright_design::harness::HarnessError;
+use upright_design::rig::{ForceOnly, RigError};
 use upright_design::simulate::SimulationError;
 use upright_design::swing_up::SwingUpError;
 use upright_design::table::NoTable;
@@ -28,6 +30,22 @@ pub(crate) enum PageRefusal {
     Simulation(#[from] SimulationError),
     #[error(transparent)]
     Fingerprint(#[from] FingerprintError),
+    #[error(transparent)]
+    Firmware(#[from] HarnessError),
+    #[error(transparent)]
+    ForceOnly(#[from] ForceOnly),
+    #[error("no rig is under power: start one")]
+    NoTwin,
+}
+
+/// A refusal as an answer: what to do, and for an error in the rig file its line and column.
+pub(crate) fn failed(refusal: &PageRefusal) -> Value {
+    let place = match refusal {
+        PageRefusal::Rig(error) => error.place,
+        _ => None,
+    };
+    let (line, column) = (place.map(|place| place.line), place.map(|place| place.column));
+    json!({ "failed": { "why": refusal.to_string(), "line": line, "column": column } })
 }
 
 /// The error without the name of the file and without the place, which the page shows where it is.

@@ -9,7 +9,7 @@ use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
-use upright::protocol::message::{Command, Reset};
+use upright::protocol::message::{Command, Message, Reset};
 use upright::protocol::serial_link::SerialLink;
 use upright::table::{GainTable, SwingUp};
 
@@ -49,20 +49,18 @@ pub fn with_table<R, S: SwingUp<NX, NY>, const NX: usize, const NY: usize>(
     swing_up: &S,
     action: impl FnOnce(&mut dyn Target) -> R,
 ) -> Result<R, HarnessError> {
-    table.check()?;
-    swing_up.check(table)?;
-    let firmware = Firmware::new(table, swing_up, Wires::<NY>::WIDTHS, Reset::Power);
-    let (mut commands, mut messages) = (Queue::<Command, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
-    let (to_control, commands) = commands.split();
-    let (messages, to_link) = messages.split();
-    let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
-    let wires = Wires { inputs, output: Output::OFF, tick_s: table.tick_s };
-    Ok(action(&mut InProcess {
-        control: ControlTask::new(firmware, wires, commands, messages),
-        link: SerialLink::new(to_control, to_link),
-        sent: Vec::new(),
-        is_read: true,
-    }))
+    let (mut commands, mut messages) = (Commands::new(), Messages::<NX, NY>::new());
+    Ok(action(&mut InProcess::start(table, swing_up, (&mut commands, &mut messages))?))
+}
+
+/// Starts the firmware of `table` in this process, where nothing ends it: for a page, which runs some ticks at a time.
+/// Its memory, some kilobytes, is never given back.
+///
+/// # Errors
+/// As for [`with_firmware`].
+pub fn endless_firmware(table: &'static TableValues) -> Result<&'static mut dyn Target, HarnessError> {
+    let (states, sensors) = (table.states(), table.sensors());
+    with_firmware_size(states, sensors, Endless(table)).ok_or(SimulationError::Size { states, sensors })?
 }
 
 struct WithFirmware<'a> {
@@ -81,6 +79,27 @@ impl WithSize for WithFirmware<'_> {
     }
 }
 
+struct Endless(&'static TableValues);
+
+impl WithSize for Endless {
+    type Output = Result<&'static mut dyn Target, HarnessError>;
+
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
+        let swing_up = self.0.swing_up.as_ref().map(|values| {
+            let others = Box::leak(Box::new(values.transitions()));
+            values.table::<NY, N>(others)
+        });
+        let (table, swing_up) =
+            (Box::leak(Box::new(self.0.table::<NX, NY>())), Box::leak(Box::new(swing_up)));
+        let (commands, messages) =
+            (Box::leak(Box::new(Commands::new())), Box::leak(Box::new(Messages::<NX, NY>::new())));
+        Ok(Box::leak(Box::new(InProcess::start(table, swing_up, (commands, messages))?)))
+    }
+}
+
+type Commands = Queue<Command, COMMANDS>;
+type Messages<const NX: usize, const NY: usize> = Queue<Message<NX, NY>, MESSAGES>;
+
 /// The image's tasks without an image.
 struct InProcess<'q, 't, S, const NX: usize, const NY: usize> {
     control: ControlTask<'q, 't, Wires<NY>, NX, NY, S>,
@@ -89,6 +108,28 @@ struct InProcess<'q, 't, S, const NX: usize, const NY: usize> {
     sent: Vec<u8>,
     /// Whether the host reads the serial line.
     is_read: bool,
+}
+
+impl<'q, 't, S: SwingUp<NX, NY>, const NX: usize, const NY: usize> InProcess<'q, 't, S, NX, NY> {
+    fn start(
+        table: &'t GainTable<NX, NY>,
+        swing_up: &'t S,
+        (commands, messages): (&'q mut Commands, &'q mut Messages<NX, NY>),
+    ) -> Result<Self, HarnessError> {
+        table.check()?;
+        swing_up.check(table)?;
+        let firmware = Firmware::new(table, swing_up, Wires::<NY>::WIDTHS, Reset::Power);
+        let (to_control, commands) = commands.split();
+        let (messages, to_link) = messages.split();
+        let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
+        let wires = Wires { inputs, output: Output::OFF, tick_s: table.tick_s };
+        Ok(Self {
+            control: ControlTask::new(firmware, wires, commands, messages),
+            link: SerialLink::new(to_control, to_link),
+            sent: Vec::new(),
+            is_read: true,
+        })
+    }
 }
 
 /// The board: inputs and output in memory.

@@ -37,7 +37,7 @@ mod target;
 
 pub use error::HarnessError;
 pub use held_rig::HeldRig;
-pub use in_process::{with_firmware, with_table};
+pub use in_process::{endless_firmware, with_firmware, with_table};
 pub use operator::{Operator, OperatorTick, Status};
 pub use rail_ends::RailEnds;
 pub use record::{FirmwareTick, Recording, goals, record};

@@ -7,12 +7,10 @@ use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
 use upright_board::UNITS_PER_MICROSECOND;
 
-use super::defect::Defect;
-use super::expected::{Expected, Phase};
-use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::Trial;
+use super::on_board::OnChip;
 use crate::in_the_loop::{Events, RunError, RunPlace, VirtualBoard};
+use upright_design::defects::{Defect, Expected, Injection, Phase, Trial};
 use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Session, Target, goals, healthy};
 use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
@@ -117,7 +115,7 @@ pub(super) struct DefectRun<'a> {
 
 impl DefectRun<'_> {
     fn run(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
-        if self.trial.kind.is_at_power_up() {
+        if self.trial.kind.begins_at_power_up() {
             return self.power_up(target);
         }
         if let During::Shaking(feed) = self.setup.during {

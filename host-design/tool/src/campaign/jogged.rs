@@ -1,81 +1,16 @@
-//! Defects in a jog: which of them prove something there, and the outcome that each must have.
+//! Defects in a jog.
 
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
-use upright::supervision::jog::{LONGEST_S, MotorSign};
+use upright_design::defects::{Expected, Injection};
 use upright_design::harness::{Harness, HarnessError};
-use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Sensing};
 
 use super::attempt::DefectRun;
-use super::defect::Defect;
-use super::expected::{Expected, Phase};
-use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::Trial;
 
 /// Longest time from pressing the key until the motor is on (s).
 const BEGIN_S: f64 = 0.5;
-/// Time for which a jog is watched from the onset on (s).
-const WATCHED_S: f64 = 0.4;
-
-impl Defect {
-    /// The outcome that it must have in a jog; `None` if it proves nothing there.
-    pub fn while_jogging(self) -> Option<Expected> {
-        match self {
-            Defect::HostSilent | Defect::HostWireOpen => Some(Expected::LetGo),
-            Defect::MotorDead | Defect::CartEncoderFrozen | Defect::EncoderWireOpen => {
-                Some(Expected::Found(MotorSign::Still))
-            }
-            Defect::MotorReversed | Defect::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
-            Defect::SupplyNotANumber
-            | Defect::SupplySag
-            | Defect::SupplyDip
-            | Defect::SupplySurge
-            | Defect::SupplySpike
-            | Defect::EmergencyStop
-            | Defect::DriverFault
-            | Defect::LimitSwitch
-            | Defect::OneOverrun
-            | Defect::Overruns
-            | Defect::FrameDamaged
-            | Defect::FrameTruncated
-            | Defect::FrameReplayed
-            | Defect::Rubbish
-            | Defect::Panic
-            | Defect::HardFault
-            | Defect::StackOverflow
-            | Defect::StalledTick
-            | Defect::LockUp
-            | Defect::CrystalStops
-            | Defect::BrownOut
-            | Defect::StopBetweenTicks => Some(self.expected()),
-            _ => None,
-        }
-    }
-}
-
-impl Trial {
-    /// The same defect in a jog. Ticks count from the first one with the motor on.
-    pub(super) fn in_jog(self, rig: &Rig) -> Self {
-        let ticks = |seconds: f64| (seconds / rig.tick.period_s) as usize;
-        let is_there_before = matches!(self.kind.while_jogging(), Some(Expected::Found(_)));
-        let (onset, watched) = match is_there_before {
-            true => (0, ticks(f64::from(LONGEST_S)) + 2),
-            // In a jog with the cart held, which lasts for 1 s.
-            false => (self.onset / 2, ticks(WATCHED_S)),
-        };
-        let scenario = Scenario {
-            sensing: Sensing::Encoders,
-            seed: self.scenario.seed,
-            substeps: self.scenario.substeps,
-            counter_start: self.scenario.counter_start,
-            ..Scenario::at_rest(rig, self.scenario.law)
-        };
-        Self { phase: Phase::Jogging, scenario, onset, watched, sensor: 0, ..self }
-    }
-}
 
 impl DefectRun<'_> {
     /// A jog, in which a person holds the key throughout.

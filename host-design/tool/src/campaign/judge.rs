@@ -8,12 +8,9 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::shaking;
 
 use super::attempt::{Setup, attempt};
-use super::defect::Defect;
-use super::expected::Phase;
-use super::expected::{Expected, Ticks};
 use super::observed::Observed;
-use super::trial::Trial;
 use crate::in_the_loop::{RunError, RunPlace};
+use upright_design::defects::{Defect, Expected, Phase, Ticks, Trial};
 use upright_design::table::TableValues;
 
 /// Class of an outcome.

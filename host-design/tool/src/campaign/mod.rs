@@ -19,23 +19,15 @@
 //! ```
 
 mod attempt;
-mod by_hand;
-mod defect;
-mod expected;
-mod injection;
 mod jogged;
 mod judge;
 mod observed;
 mod on_board;
 mod shaken;
 mod tally;
-mod trial;
 
 pub use attempt::{During, Setup};
-pub use by_hand::Defective;
-pub use defect::{Defect, Needs};
-pub use expected::{Expected, Phase, Ticks};
 pub use judge::{Class, TrialOutcome};
 pub use shaken::feed;
 pub use tally::{Campaign, CampaignError, DefectRow, campaign, kinds, one};
-pub use trial::Trial;
+pub use upright_design::defects::{Defect, Defective, Expected, Needs, Phase, Ticks, Trial};

@@ -6,10 +6,10 @@ use upright_board::{
     Chip, Conditions, ExternalLevel, Image, Input, Pin, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND,
 };
 
-use super::defect::Defect;
-use super::trial::Trial;
-use crate::in_the_loop::Event;
+use upright_design::defects::{Defect, Trial};
 use upright_design::table::TableValues;
+
+use crate::in_the_loop::Event;
 
 /// Registers of timer 1 on which the motor's force depends (RM0090, 17.4): ARR, RCR, CCMR1, CCER, BDTR.
 const MOTOR_REGISTERS: [u32; 5] = [0x4001_002c, 0x4001_0030, 0x4001_0018, 0x4001_0020, 0x4001_0044];
@@ -24,9 +24,23 @@ const INSIDE: Time = 3 * US;
 /// Time for which the supply of the chip is below the voltage detector's threshold.
 const DIP: Time = 300 * US;
 
-impl Defect {
+/// What only a board has of a defect.
+pub(super) trait OnChip {
     /// Conditions of the trial's board, drawn within their tolerances.
-    pub(super) fn conditions(self, trial: &Trial, typical: Conditions) -> Conditions {
+    fn conditions(self, trial: &Trial, typical: Conditions) -> Conditions;
+
+    /// Faults injected at power-up; without `guarded`, they disable the guard that this kind needs.
+    fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input>;
+
+    /// Whether it is present from power-up on, and prevents arming.
+    fn begins_at_power_up(self) -> bool;
+
+    /// Events in the first tick of the defect, for a board that receives from the host at the pin `receive`.
+    fn events(self, trial: &Trial, table: &TableValues, image: &Image, receive: Pin) -> Vec<Event>;
+}
+
+impl OnChip for Defect {
+    fn conditions(self, trial: &Trial, typical: Conditions) -> Conditions {
         let mut conditions = Conditions { seed: trial.seed, ..typical };
         // The watchdog's oscillator and the others within their tolerances (datasheet, LSI and HSI).
         conditions.lsi_hz = (17_000.0 + 30_000.0 * trial.size) as u32;
@@ -42,8 +56,7 @@ impl Defect {
         conditions
     }
 
-    /// Faults injected at power-up; without `guarded`, they disable the guard that this kind needs.
-    pub(super) fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input> {
+    fn at_power_up(self, trial: &Trial, guarded: bool) -> Vec<Input> {
         let register = MOTOR_REGISTERS[(trial.size * 4.99) as usize];
         match self {
             Defect::WriteLost if guarded => vec![Input::LoseWrite(register)],
@@ -55,31 +68,11 @@ impl Defect {
         }
     }
 
-    /// Whether there is a guard that can be disabled: without it, the defect must be missed.
-    pub fn needs_guard(self) -> bool {
-        matches!(
-            self,
-            Defect::WriteLost
-                | Defect::StalledTick
-                | Defect::LockUp
-                | Defect::StopBetweenTicks
-                | Defect::StackOverflow
-        )
-    }
-
-    /// Whether it is present from power-up on, and prevents arming.
-    pub(super) fn is_at_power_up(self) -> bool {
+    fn begins_at_power_up(self) -> bool {
         matches!(self, Defect::CrystalMissing | Defect::CrystalWrong | Defect::ChipWrong | Defect::WriteLost)
     }
 
-    /// Events in the first tick of the defect, for a board that receives from the host at the pin `receive`.
-    pub(super) fn events(
-        self,
-        trial: &Trial,
-        table: &TableValues,
-        image: &Image,
-        receive: Pin,
-    ) -> Vec<Event> {
+    fn events(self, trial: &Trial, table: &TableValues, image: &Image, receive: Pin) -> Vec<Event> {
         let mut random = trial.random();
         let tick = (f64::from(table.tick_s) * UNITS_PER_SECOND as f64) as Time;
         let at = |after: Time, input: Input| Event::Input { after, input };

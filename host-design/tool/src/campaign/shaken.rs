@@ -1,12 +1,11 @@
-//! Defects while the rig is shaken: which of them prove something there, and the outcome that each must have.
+//! Defects while the rig is shaken.
 
 use core::f64::consts::PI;
 
-use rand::RngExt;
 use upright::control::actuator::Drive;
-use upright::protocol::HOST_SILENCE_S;
 use upright::protocol::message::Request;
-use upright::supervision::shaking::{ANGLE_RAD, RETURN_S};
+use upright::supervision::shaking::ANGLE_RAD;
+use upright_design::defects::{Defect, Expected, Injection, Phase, SHAKEN_S};
 use upright_design::harness::{HarnessError, Target};
 use upright_design::identify::{Feed, IdentifyError, Shaken};
 use upright_design::plant::absolute_angles;
@@ -14,26 +13,14 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
 use super::attempt::{BEYOND, DefectRun, During};
-use super::defect::Defect;
-use super::expected::Expected;
-use super::expected::Phase;
-use super::injection::Injection;
 use super::observed::Observed;
-use super::trial::Trial;
-
-/// The defects begin between these times (s): while the cart is pushed each way, and while everything is shaken.
-const ONSET_S: [f64; 2] = [0.05, 5.0];
-/// Time for which a defect is watched (s): usually, and at most for one that has to turn the motor off.
-const WATCHED_S: [f64; 2] = [1.0, 6.0];
-/// Duration of the excitation (s).
-const LENGTH_S: f64 = ONSET_S[1] + WATCHED_S[1];
 
 /// The excitation forces of a campaign's runs.
 ///
 /// # Errors
 /// [`IdentifyError`] if the rig cannot be shaken.
 pub fn feed(rig: &Rig, table: &TableValues, seed: u64) -> Result<Feed, IdentifyError> {
-    Feed::new(rig, table, LENGTH_S, seed)
+    Feed::new(rig, table, SHAKEN_S, seed)
 }
 
 impl During<'_> {
@@ -62,51 +49,6 @@ impl During<'_> {
             During::Balancing | During::Jog => true,
         };
         must_end && kind.needs_detection()
-    }
-}
-
-impl Defect {
-    /// The outcome that it must have while the rig is shaken; `None` if it proves nothing there.
-    pub fn while_shaken(self) -> Option<Expected> {
-        match self {
-            Defect::HostSilent | Defect::HostWireOpen | Defect::HostDeaf => Some(Expected::LetGo),
-            // What stands still while the motor pushes, and a cart that runs away.
-            Defect::LinkEncoderFrozen
-            | Defect::CartEncoderFrozen
-            | Defect::EncoderWireOpen
-            | Defect::MotorStuck => Some(Expected::Changed),
-            // There is no observer: only what leads beyond a limit is found. The log shows the rest to the host.
-            Defect::BadSample
-            | Defect::EncoderJump
-            | Defect::EncoderReversed
-            | Defect::EncodersSwapped
-            | Defect::MotorDead
-            | Defect::MotorReversed
-            | Defect::Push => Some(Expected::Bounded),
-            Defect::ArmUnhomed
-            | Defect::ArmHanging
-            | Defect::ArmStopped
-            | Defect::ArmHeld
-            | Defect::CrystalMissing
-            | Defect::CrystalWrong
-            | Defect::ChipWrong
-            | Defect::WriteLost => None,
-            _ => Some(self.expected()),
-        }
-    }
-}
-
-impl Trial {
-    /// The same defect while the rig is shaken. Ticks count from the first one with the motor on.
-    pub(super) fn in_shaking(self, rig: &Rig) -> Self {
-        let ticks = |seconds: f64| (seconds / rig.tick.period_s) as usize;
-        let watched_s = match self.kind.while_shaken() {
-            Some(Expected::LetGo) => f64::from(HOST_SILENCE_S + RETURN_S) + WATCHED_S[0],
-            Some(Expected::Changed) => WATCHED_S[1],
-            _ => WATCHED_S[0],
-        };
-        let onset = self.random().random_range(ticks(ONSET_S[0])..ticks(ONSET_S[1]));
-        Self { phase: Phase::Shaken, onset, watched: ticks(watched_s), ..self }
     }
 }
 

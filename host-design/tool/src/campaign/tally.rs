@@ -6,11 +6,9 @@ use serde::Serialize;
 use upright::supervision::fault::Fault;
 
 use super::attempt::{During, Setup};
-use super::defect::{Defect, Needs};
-use super::expected::Expected;
 use super::judge::{Class, TrialOutcome, allowed, judge, silence_ticks};
-use super::trial::Trial;
 use crate::in_the_loop::{RunError, RunPlace};
+use upright_design::defects::{Defect, Expected, Needs, Trial};
 use upright_design::study::{Study, StudyError};
 use upright_design::table::TableValues;
 use upright_design::verify::VerifyError;
@@ -92,17 +90,10 @@ pub struct Campaign {
 
 /// The kinds of defects that are possible with this rig and this place.
 pub fn kinds(table: &TableValues, place: RunPlace<'_>) -> Vec<Defect> {
-    let has_supply = table.limits.supply_min_v > 0.0;
-    let has_links = table.sensors() > 1;
     Defect::ALL
         .iter()
         .copied()
-        .filter(|kind| match kind {
-            Defect::SupplySag | Defect::SupplyDip => has_supply,
-            Defect::SupplySurge | Defect::SupplySpike => table.motor.is_some(),
-            Defect::LinkEncoderFrozen | Defect::EncodersSwapped => has_links,
-            _ => true,
-        })
+        .filter(|kind| kind.is_possible(table))
         .filter(|kind| match place {
             RunPlace::Host => !matches!(kind.needs(), Needs::Image | Needs::Board),
             RunPlace::Qemu { .. } => !matches!(kind.needs(), Needs::Process | Needs::Board),

@@ -19,9 +19,7 @@ mod swing_up;
 mod theme;
 
 pub(crate) use png::pixels;
-pub(crate) use theme::{
-    CHROMATIC, COLOURS_CSS, curve_colour, curve_dash, limit_colour, reference_colour, style_sheet,
-};
+pub(crate) use theme::{CHROMATIC, COLOURS_CSS, curve_colour, page_theme, reference_colour, style_sheet};
 
 pub use draw::{Drawing, PlotArea};
 pub use front::front_figure;

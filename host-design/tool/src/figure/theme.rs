@@ -62,13 +62,23 @@ pub(crate) fn curve_colour(number: usize) -> String {
 }
 
 /// The dash of curve `number` (px); empty: solid.
-pub(crate) fn curve_dash(number: usize) -> &'static [u32] {
+fn curve_dash(number: usize) -> &'static [u32] {
     DASHES[number % DASHES.len()]
 }
 
 /// The colour of limits.
-pub(crate) fn limit_colour() -> String {
+fn limit_colour() -> String {
     hex(LIMIT)
+}
+
+/// The look of curves for a page that draws them: colours, dashes, and the colours of references and limits.
+pub(crate) fn page_theme() -> serde_json::Value {
+    serde_json::json!({
+        "colours": (0..CHROMATIC).map(curve_colour).collect::<Vec<_>>(),
+        "dashes": (0..CHROMATIC).map(curve_dash).collect::<Vec<_>>(),
+        "reference": reference_colour(),
+        "limit": limit_colour(),
+    })
 }
 
 /// The colours of pages in the light and the dark scheme.

@@ -6,6 +6,8 @@ use std::time::{Duration, SystemTime};
 
 use serialport::SerialPort;
 use upright::protocol::BAUD;
+use upright_design::client::AnyTelemetry;
+use upright_design::conversation::Monitor;
 
 /// Names of serial ports on this system, for an error message.
 const PORTS: &str = if cfg!(windows) {
@@ -117,6 +119,19 @@ impl SerialLine {
     pub fn exchange<'a>(&mut self, bytes: &[u8], buffer: &'a mut [u8]) -> std::io::Result<&'a [u8]> {
         self.send(bytes)?;
         self.receive(buffer)
+    }
+
+    /// Sends what is due in a conversation, and receives for at most 5 ms; returns the telemetry. A line that fails
+    /// ends the conversation.
+    pub fn carry(&mut self, conversation: &mut Monitor) -> Vec<AnyTelemetry> {
+        conversation.poll(now());
+        match self.exchange(&conversation.take_outgoing(), &mut [0; 4096]) {
+            Ok(bytes) => conversation.receive(bytes, now()),
+            Err(error) => {
+                conversation.close(&error);
+                Vec::new()
+            }
+        }
     }
 }
 

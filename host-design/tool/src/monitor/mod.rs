@@ -1,8 +1,6 @@
-//! The conversation of a person at the keyboard with a running firmware, through the host's
-//! [client](upright_design::client).
+//! The [conversation](upright_design::conversation) of a person at the keyboard with a running firmware.
 //!
-//! [`Monitor`] holds the state and knows neither terminal nor line: bytes and keys go in, bytes come out. [`view`]
-//! draws it, [`SerialLine`] is a serial device or a TCP connection, [`record`] writes telemetry.
+//! [`view`] draws it, [`SerialLine`] is a serial device or a TCP connection.
 //!
 //! ```
 //! use upright::protocol::message::Request;
@@ -15,11 +13,8 @@
 
 mod command;
 mod line;
-mod model;
-pub mod record;
 pub mod view;
-pub mod words;
 
-pub use command::{BadCommand, MonitorAction, action, request};
+pub use command::action;
 pub use line::{OpenError, SerialLine, now};
-pub use model::{Ended, Monitor};
+pub use upright_design::conversation::{BadCommand, Ended, Monitor, MonitorAction, record, request, words};

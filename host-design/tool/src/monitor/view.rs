@@ -9,9 +9,7 @@ use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright_design::client::AnyTelemetry;
-
-use super::model::Monitor;
-use super::words;
+use upright_design::conversation::{Monitor, words};
 
 const KEYS: &str = "h/H home (rail)  g check signs  m/M jog (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use upright_design::swing_up::Stored;
+
 use super::error::SiteError;
 use super::page::Example;
 
@@ -24,6 +26,7 @@ pub fn examples(folder: &Path) -> Result<Vec<Example>, SiteError> {
         Ok(Example {
             name: file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             toml: std::fs::read_to_string(file).map_err(failed(file))?,
+            motions: std::fs::read_to_string(Stored::path_beside(file)).ok(),
         })
     };
     files.iter().map(example).collect()

@@ -12,7 +12,9 @@
 mod error;
 mod examples;
 mod module;
+mod motions;
 mod page;
+mod twin;
 
 pub use error::SiteError;
 pub use examples::examples;

@@ -2,17 +2,22 @@
 
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use serde::Serialize;
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::figure::{COLOURS_CSS, style_sheet};
+use super::motions::packed;
+use super::twin::TwinPage;
+use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 
 const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
-const WORKER: &str = include_str!("page/worker.js");
-const SCRIPTS: [&str; 4] = [
+const WORKER: &str = concat!(include_str!("page/worker.js"), include_str!("page/running.js"));
+const SCRIPTS: [&str; 6] = [
     include_str!("page/link.js"),
+    include_str!("page/motions.js"),
     include_str!("page/drawing.js"),
     include_str!("page/editor.js"),
+    include_str!("page/balance.js"),
     include_str!("page/desk.js"),
 ];
 
@@ -20,12 +25,14 @@ const SCRIPTS: [&str; 4] = [
 const COMPRESSION: u8 = 10;
 
 /// A rig from which a person can start.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Example {
     /// Its name.
     pub name: String,
     /// Its rig file.
     pub toml: String,
+    /// Its stored motions from hanging to upright and back, if there are any.
+    pub motions: Option<String>,
 }
 
 /// The page with this module and these examples.
@@ -36,17 +43,25 @@ pub fn page(module: &[u8], examples: &[Example]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
     let script = format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat());
+    let twin = TwinPage::new();
+    // A document inside the page has its policy.
     let policy = format!(
-        "default-src 'none'; script-src '{}' 'wasm-unsafe-eval' blob:; style-src '{}'; img-src data:; \
+        "default-src 'none'; script-src '{}' '{}' 'wasm-unsafe-eval' blob:; style-src '{}' '{}'; img-src data:; \
          worker-src blob:; base-uri 'none'; form-action 'none'",
         source(&script),
-        source(&style)
+        source(&twin.script),
+        source(&style),
+        source(&twin.style)
     );
+    let (shown, knots) = shown(examples);
     let parts = [
         ("{policy}", policy),
         ("{style}", style),
-        ("{examples}", json(&examples)),
-        ("{worker}", json(&WORKER)),
+        ("{examples}", embedded(&shown)),
+        ("{worker}", embedded(&WORKER)),
+        ("{twin}", embedded(&twin.html)),
+        ("{theme}", embedded(&page_theme())),
+        ("{motions}", base64(&compress_to_vec_zlib(&knots, COMPRESSION))),
         ("{module}", base64(&compress_to_vec_zlib(module, COMPRESSION))),
         ("{script}", script),
     ];
@@ -61,8 +76,22 @@ pub fn page(module: &[u8], examples: &[Example]) -> String {
     page + rest
 }
 
+/// The examples as the page reads them, and the knots of all their motions.
+fn shown(examples: &[Example]) -> (Vec<Value>, Vec<u8>) {
+    let mut knots = Vec::new();
+    let mut of = |example: &Example| {
+        let motions = example.motions.as_deref().and_then(packed).map(|(text, mut bytes)| {
+            let from = knots.len();
+            knots.append(&mut bytes);
+            json!({ "text": text, "from": from })
+        });
+        json!({ "name": example.name, "toml": example.toml, "motions": motions })
+    };
+    (examples.iter().map(&mut of).collect(), knots)
+}
+
 /// JSON that can stand in a page.
-fn json(value: &impl Serialize) -> String {
+fn embedded(value: &impl Serialize) -> String {
     // Serialising strings into memory does not fail.
     serde_json::to_string(value).unwrap_or_default().replace("</", "<\\/")
 }
@@ -103,9 +132,9 @@ mod tests {
     #[test]
     fn the_page_holds_all_of_its_parts_and_asks_for_nothing() {
         let toml = "name = \"</script>\"".to_owned();
-        let page = page(b"module", &[Example { name: "mine".to_owned(), toml }]);
+        let page = page(b"module", &[Example { name: "mine".to_owned(), toml, motions: None }]);
         assert!(page.contains("default-src 'none'") && page.contains("<\\/script>"));
-        assert_eq!(page.matches("</script>").count(), 4);
+        assert_eq!(page.matches("</script>").count(), 7);
         assert!(page.trim_end().ends_with("</html>"), "a mark is missing in the page");
         for request in ["src=\"", "@import", "fetch(", "XMLHttpRequest", "https://", "url("] {
             assert!(!page.contains(request), "{request}");

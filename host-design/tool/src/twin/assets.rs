@@ -4,23 +4,24 @@ use crate::figure::COLOURS_CSS;
 
 /// A file of the page.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Asset {
+pub(crate) struct Asset {
     /// Its name in the address; empty for the page itself.
-    pub(super) name: &'static str,
+    pub(crate) name: &'static str,
     /// Its media type.
-    pub(super) media_type: &'static str,
+    pub(crate) media_type: &'static str,
     /// Its content.
-    pub(super) content: &'static str,
+    pub(crate) content: &'static str,
 }
 
 const SCRIPT: &str = "text/javascript";
 
 /// All files of the page.
-pub(super) const ASSETS: [Asset; 8] = [
+pub(crate) const ASSETS: [Asset; 9] = [
     Asset { name: "", media_type: "text/html", content: include_str!("page/page.html") },
     Asset { name: "colours.css", media_type: "text/css", content: COLOURS_CSS },
     Asset { name: "page.css", media_type: "text/css", content: include_str!("page/page.css") },
     Asset { name: "main.js", media_type: SCRIPT, content: include_str!("page/main.js") },
+    Asset { name: "colours.js", media_type: SCRIPT, content: include_str!("page/colours.js") },
     Asset { name: "link.js", media_type: SCRIPT, content: include_str!("page/link.js") },
     Asset { name: "rig.js", media_type: SCRIPT, content: include_str!("page/rig.js") },
     Asset { name: "scope.js", media_type: SCRIPT, content: include_str!("page/scope.js") },

@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use upright_design::client::ExpectedRig;
 
-use super::dispatcher::Dispatcher;
-use super::pace::PICTURE;
+use super::dispatcher::{Dispatcher, PICTURE};
 use crate::monitor::{SerialLine, now};
 
 /// Longest wait at the end, when the motor is turned off, for the answer.
@@ -24,9 +23,9 @@ pub(super) fn run(
     while goes_on() {
         // What only a simulation can do is ignored.
         let _ = dispatcher.requests(now());
-        if dispatcher.monitor.ended.is_none() {
+        if dispatcher.console.monitor.ended.is_none() {
             exchange(&mut line, dispatcher);
-            dispatcher.monitor.expect_rig(rig);
+            dispatcher.console.monitor.expect_rig(rig);
         } else {
             std::thread::sleep(PICTURE);
         }
@@ -36,15 +35,18 @@ pub(super) fn run(
         }
     }
     // From here on, requests of the viewer in command are no longer read.
-    dispatcher.turn_off(now());
+    dispatcher.console.turn_off(now());
     let end = Instant::now() + LAST_WAIT;
-    while dispatcher.monitor.ended.is_none() && dispatcher.monitor.is_waiting() && Instant::now() < end {
+    while dispatcher.console.monitor.ended.is_none()
+        && dispatcher.console.monitor.is_waiting()
+        && Instant::now() < end
+    {
         exchange(&mut line, dispatcher);
     }
 }
 
 /// Sends pending bytes, and receives.
 fn exchange(line: &mut SerialLine, dispatcher: &mut Dispatcher) {
-    let telemetry = dispatcher.monitor.exchange(line);
-    dispatcher.take(telemetry);
+    let telemetry = line.carry(&mut dispatcher.console.monitor);
+    dispatcher.console.take(telemetry);
 }

@@ -10,8 +10,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
-
-use super::request::PageRequest;
+use upright_page::twin::PageRequest;
 
 /// Most viewers at a time.
 pub(super) const MAX_VIEWERS: usize = 8;

@@ -9,9 +9,8 @@
 //! | `access.rs` | which requests are let in |
 //! | `half_open.rs` | connections that have not asked yet |
 //! | `connections.rs` | connections of pages |
-//! | `request.rs` | what a page asks for |
-//! | `dispatcher.rs` | conversation with the firmware, command, recording |
-//! | `simulated.rs` | the simulated machine, with `pull.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
+//! | `dispatcher.rs` | who is in command, and the recording |
+//! | `simulated.rs` | a simulated machine in real time; what it does is in [`upright_page::twin`] |
 //! | `connected.rs` | a machine behind a serial line |
 //! | `page/` | the page |
 //!
@@ -22,20 +21,13 @@
 //! ```
 
 mod access;
-mod assets;
-mod challenge;
+pub(crate) mod assets;
 mod connected;
 mod connections;
 mod dispatcher;
-mod greeting;
 mod half_open;
-mod holding;
-mod pace;
-mod property;
-mod pull;
-mod request;
 mod server;
 mod simulated;
 
 pub use server::Server;
-pub use simulated::SimulatedMachine;
+pub use upright_page::twin::SimulatedMachine;

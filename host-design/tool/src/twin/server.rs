@@ -4,23 +4,21 @@ use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
+use serde_json::Value;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
+use upright_page::twin::{Properties, SimulatedMachine, TELEMETRY_S, greeting};
 
 use super::access::{Access, Admitted, accept, send};
 use super::connected;
 use super::connections::Connections;
 use super::dispatcher::{Dispatcher, SharedCsv};
-use super::greeting::greeting;
 use super::half_open::HalfOpen;
-use super::property::Properties;
-use super::simulated::{RunEnd, SimulatedMachine};
+use super::simulated::{RunEnd, run};
 use crate::campaign::{Defect, kinds};
+use crate::figure::page_theme;
 use crate::in_the_loop::{RunError, RunPlace};
 use crate::monitor::{Monitor, SerialLine};
-
-/// Time between two telemetry messages if nothing limits them (s).
-const TELEMETRY_S: f32 = 0.005;
 
 /// Serves a page at an address that only the person who started it knows.
 pub struct Server {
@@ -68,7 +66,7 @@ impl Server {
         let SimulatedMachine { rig, table, .. } = machine;
         let defects: Vec<Defect> =
             kinds(table, place).into_iter().filter(|kind| kind.can_begin_while_balancing()).collect();
-        let (viewers, events) = Connections::new(greeting(rig, table, place.name(), Some(&defects)));
+        let (viewers, events) = Connections::new(themed(greeting(rig, table, place.name(), Some(&defects))));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let monitor = || match place {
             // Its serial line carries no more than the usual rate.
@@ -80,8 +78,7 @@ impl Server {
         let mut upright = upright;
         loop {
             let ended = place.with_target(table, |target| {
-                machine
-                    .run(target, &mut dispatcher, &mut properties, upright, goes_on)
+                run(machine, target, &mut dispatcher, &mut properties, upright, goes_on)
                     .map_err(RunError::from)
             });
             upright = match ended {
@@ -112,12 +109,18 @@ impl Server {
         name: &str,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<(), RunError> {
-        let (viewers, events) = Connections::new(greeting(rig, table, name, None));
+        let (viewers, events) = Connections::new(themed(greeting(rig, table, name, None)));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
         let mut dispatcher = Dispatcher::new(Monitor::new(name), (viewers, events), self.recording);
         connected::run(line, &mut dispatcher, rig.into(), goes_on);
         Ok(())
     }
+}
+
+/// The greeting with the look of curves, as in a document.
+fn themed(mut greeting: Value) -> Value {
+    greeting["theme"] = page_theme();
+    greeting
 }
 
 /// Lets viewers in, each in its own thread, until it is dropped.

@@ -1,17 +1,17 @@
-// Answers questions with the page's module in Node: node in_node.mjs MODULE QUESTIONS prints the answers.
+// Answers questions with the page's module in Node: node in_node.mjs MODULE QUESTIONS prints the answers, as texts.
 
 import { readFileSync } from 'node:fs';
 
 const { instance } = await WebAssembly.instantiate(readFileSync(process.argv[2]), {});
-const { memory, buffer, answer } = instance.exports;
+const { memory, buffer, answer, twin } = instance.exports;
 
 const answers = JSON.parse(readFileSync(process.argv[3], 'utf8')).map((question) => {
   const bytes = new TextEncoder().encode(JSON.stringify(question));
   // The memory may be another one after each call.
   const at = buffer(bytes.length);
   new Uint8Array(memory.buffer, at, bytes.length).set(bytes);
-  const length = answer();
+  const length = question.twin === undefined ? answer() : twin();
   const from = buffer(length);
-  return JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, from, length)));
+  return new TextDecoder().decode(new Uint8Array(memory.buffer, from, length));
 });
 process.stdout.write(JSON.stringify(answers));

@@ -36,6 +36,7 @@ mod serial_errors;
 mod shaken;
 mod site_bits;
 mod site_page;
+mod site_twin;
 mod split_command;
 mod stepper_command;
 mod transitions_command;

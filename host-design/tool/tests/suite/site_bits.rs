@@ -42,7 +42,7 @@ pub(crate) fn is_wanted(what: &str) -> bool {
 }
 
 /// The answers of the module in Node.
-fn in_node(questions: &[Value]) -> Vec<Value> {
+pub(crate) fn in_node(questions: &[Value]) -> Vec<Value> {
     let folder = tempfile::tempdir().unwrap();
     let (wasm, asked) = (folder.path().join("page.wasm"), folder.path().join("questions.json"));
     std::fs::write(&wasm, module().unwrap()).unwrap();
@@ -50,7 +50,8 @@ fn in_node(questions: &[Value]) -> Vec<Value> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/in_node.mjs");
     let output = Command::new("node").arg(script).args([&wasm, &asked]).output().expect("Node is installed");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
+    let answers: Vec<String> = serde_json::from_slice(&output.stdout).unwrap();
+    answers.iter().map(|answer| serde_json::from_str(answer).unwrap()).collect()
 }
 
 #[test]

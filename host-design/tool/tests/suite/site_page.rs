@@ -17,12 +17,12 @@ use crate::site_bits::is_wanted;
 const COMPRESSED: usize = 1_000_000;
 const TELEPHONE: u32 = 390;
 
-fn root() -> std::path::PathBuf {
+pub(crate) fn root() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// Waits until the page has computed everything, and an expression is true.
-fn until(browser: &mut Browser, expression: &str) {
+pub(crate) fn until(browser: &mut Browser, expression: &str) {
     let begin = Instant::now();
     while browser.value(&format!("Boolean(!upright.isBusy() && ({expression}))")) != true {
         let told = browser.value("document.getElementById('told').textContent");
@@ -31,7 +31,7 @@ fn until(browser: &mut Browser, expression: &str) {
     }
 }
 
-fn type_in(browser: &mut Browser, toml: &str) {
+pub(crate) fn type_in(browser: &mut Browser, toml: &str) {
     browser.value(&format!(
         "{{ const text = document.getElementById('toml'); text.value = {}; text.dispatchEvent(new Event('input')); }}",
         json!(toml)
@@ -48,7 +48,7 @@ fn written(arguments: &[&str], option: &str) -> String {
 }
 
 /// The page in a folder, opened; `None` where it cannot be.
-fn opened() -> Option<(Browser, tempfile::TempDir)> {
+pub(crate) fn opened() -> Option<(Browser, tempfile::TempDir)> {
     let what = "the page that designs rigs";
     let mut browser = is_wanted(what).then(|| Browser::for_test_of(what)).flatten()?;
     let folder = tempfile::tempdir().unwrap();

@@ -17,10 +17,10 @@ use upright_design::verify::linear;
 use crate::report_devtools::Browser;
 
 const TELEPHONE: u32 = 390;
-const STATE: &str = "document.getElementById('state').dataset.state ?? ''";
+pub(crate) const STATE: &str = "document.getElementById('state').dataset.state ?? ''";
 /// Fastest speed that the page offers (simulated seconds per second).
-const FASTEST: f64 = 10.0;
-const MACHINE: &str = "upright.seen.picture.machine";
+pub(crate) const FASTEST: f64 = 10.0;
+pub(crate) const MACHINE: &str = "upright.seen.picture.machine";
 
 /// A running twin. Dropping it ends it.
 pub(crate) struct Twin {
@@ -56,12 +56,12 @@ fn browser() -> Option<Browser> {
     Browser::for_test_of("the twin")
 }
 
-fn wait(seconds: f64) {
+pub(crate) fn wait(seconds: f64) {
     std::thread::sleep(Duration::from_secs_f64(seconds));
 }
 
 /// Waits for at most `seconds` until an expression is true; returns whether it is.
-fn comes_within(browser: &mut Browser, seconds: f64, expression: &str) -> bool {
+pub(crate) fn comes_within(browser: &mut Browser, seconds: f64, expression: &str) -> bool {
     let begin = Instant::now();
     while browser.value(&format!("Boolean({expression})")) != true {
         if begin.elapsed().as_secs_f64() > seconds {
@@ -73,13 +73,13 @@ fn comes_within(browser: &mut Browser, seconds: f64, expression: &str) -> bool {
 }
 
 /// Waits until an expression is true.
-fn until(browser: &mut Browser, expression: &str) {
+pub(crate) fn until(browser: &mut Browser, expression: &str) {
     let is_there = comes_within(browser, 90.0, expression);
     assert!(is_there, "never: {expression}; state {}", browser.value(STATE));
 }
 
 /// From now on, simulated time runs `factor` times as fast as real time.
-fn set_speed(browser: &mut Browser, factor: f64) {
+pub(crate) fn set_speed(browser: &mut Browser, factor: f64) {
     browser.value(&format!(
         "{{ const speed = document.getElementById('speed'); speed.value = '{factor}'; \
          speed.dispatchEvent(new Event('change')); }}"
@@ -88,12 +88,12 @@ fn set_speed(browser: &mut Browser, factor: f64) {
 }
 
 /// Waits until `seconds` of simulated time have passed.
-fn let_pass(browser: &mut Browser, seconds: f64) {
+pub(crate) fn let_pass(browser: &mut Browser, seconds: f64) {
     let begin = browser.value(&format!("{MACHINE}.t_s")).as_f64().unwrap();
     until(browser, &format!("{MACHINE}.t_s > {}", begin + seconds));
 }
 
-fn until_state(browser: &mut Browser, state: &str) {
+pub(crate) fn until_state(browser: &mut Browser, state: &str) {
     until(browser, &format!("({STATE}) === '{state}'"));
 }
 
@@ -104,14 +104,16 @@ fn end_of(browser: &mut Browser, link: usize) -> [f64; 2] {
          let [x, y, phi] = [view.state[0], 0, 0]; \
          for (let k = 0; k < {link}; k += 1) {{ phi += view.state[2 + 2 * k]; \
          x -= view.hello.lengths_m[k] * Math.sin(phi); y += view.hello.lengths_m[k] * Math.cos(phi); }} \
-         const [px, py] = view.toScreen([x, y]); return [box.left + px, box.top + py]; }})()"
+         const [px, py] = view.toScreen([x, y]); \
+         const frame = window.frameElement?.getBoundingClientRect() ?? {{ left: 0, top: 0 }}; \
+         return [frame.left + box.left + px, frame.top + box.top + py]; }})()"
     );
     let point = browser.value(&expression);
     [0, 1].map(|axis| point[axis].as_f64().unwrap())
 }
 
 /// Grabs the end of a link and pulls it sideways for a time, then lets go.
-fn pull(browser: &mut Browser, link: usize, by_px: f64, seconds: f64) -> Value {
+pub(crate) fn pull(browser: &mut Browser, link: usize, by_px: f64, seconds: f64) -> Value {
     let [x, y] = end_of(browser, link);
     browser.mouse("mouseMoved", [x, y - 4.0]);
     browser.mouse("mousePressed", [x, y + 2.0]);
@@ -124,7 +126,7 @@ fn pull(browser: &mut Browser, link: usize, by_px: f64, seconds: f64) -> Value {
     pulled
 }
 
-fn click(browser: &mut Browser, selector: &str) {
+pub(crate) fn click(browser: &mut Browser, selector: &str) {
     browser.value(&format!("document.querySelector('{selector}').click()"));
 }
 
@@ -178,7 +180,7 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
 }
 
 /// Catches the rig, then homes it and checks the signs of encoders and motor, with keys alone.
-fn catch_and_calibrate(browser: &mut Browser) {
+pub(crate) fn catch_and_calibrate(browser: &mut Browser) {
     set_speed(browser, FASTEST);
     browser.key("j");
     until(browser, &format!("{MACHINE}.holding === 'hanging'"));
@@ -210,7 +212,7 @@ fn catch_and_calibrate(browser: &mut Browser) {
 }
 
 /// Presses a key every half second until an expression is true, as a person does whose command is refused for now.
-fn until_done(browser: &mut Browser, key: &str, expression: &str) {
+pub(crate) fn until_done(browser: &mut Browser, key: &str, expression: &str) {
     for _ in 0..60 {
         if browser.value(&format!("Boolean({expression})")) == true {
             return;

@@ -7,6 +7,7 @@ const LEAST_MS = 16;
 const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, error: null };
 let checker = null;
 let designer = null;
+let twin = null;
 
 const editor = new Editor(() => changed());
 const set = (key, value) => {
@@ -30,7 +31,7 @@ function changed() {
 
 function checked(answer) {
   editor.mark(answer.failed);
-  for (const id of ['save-table', 'save-header', 'save-csv']) byId(id).disabled = true;
+  for (const id of ['save-table', 'save-header', 'save-csv', 'balance']) byId(id).disabled = true;
   if (answer.failed !== undefined) return;
   desk.sketch = answer;
   byId('unusual').replaceChildren(...answer.unusual.map((text) => element('li', { textContent: text })));
@@ -65,8 +66,7 @@ function designed(answer, ms) {
   }
   const table = answer.crc === null ? `no table: ${answer.no_table}` : `table ${answer.crc}`;
   tell(`${answer.states} states; every gain equal at ${answer.bits[0]} and ${answer.bits[1]} bits; ${table}; designed and run in ${(ms / 1e3).toFixed(2)} s`);
-  for (const id of ['save-table', 'save-header']) byId(id).disabled = answer.crc === null;
-  byId('save-csv').disabled = answer.crc === null;
+  for (const id of ['save-table', 'save-header', 'save-csv', 'balance']) byId(id).disabled = answer.crc === null;
   showLoop();
   showDesign();
 }
@@ -185,6 +185,12 @@ function csvOfRun() {
   return `${['t_s', 'setpoint_m', desk.sketch.input, ...states].join()}\n${lines.join('\n')}\n`;
 }
 
+// The stored motions of the example that the rig began as; they are used if it has not changed.
+async function motions() {
+  const example = examples.find(({ name }) => name === desk.sketch.rig);
+  return example === undefined ? null : motionsOf(example);
+}
+
 // The rig in the address, behind the mark that is never sent to a server.
 function linkToRig() {
   const bytes = new TextEncoder().encode(editor.value);
@@ -217,6 +223,9 @@ function listen() {
   }
   byId('law').addEventListener('change', () => { showLoop(); showDesign(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
+  byId('balance').addEventListener('click', async () => {
+    twin.open({ toml: editor.value, motions: await motions(), upright: byId('raised').checked });
+  });
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
   byId('save-header').addEventListener('click', () => saveExported('header', 'controller.h'));
@@ -245,12 +254,13 @@ async function begin() {
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
   editor.set(rigOfLink() ?? first.toml);
-  const module = await moduleBytes();
+  const module = await inflated('module');
   checker = new Thread(module);
   designer = new Thread(module);
+  twin = new Twin(module, (why) => tell(why, true));
   changed();
 }
 
 // For tests, and for the curious.
-globalThis.upright = { desk, exported, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
+globalThis.upright = { desk, exported, motions, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
 begin().catch((error) => tell(`this browser cannot compute the design: ${error.message}`, true));

@@ -20,6 +20,7 @@ const short = (value) => Number(value.toPrecision(6)).toString();
 // Draws the rig in a state (x, ẋ, θ_1, θ̇_1 …), seen at a fixed place with the cart in the middle.
 function drawRig(place, { lengths_m: lengths, travel_m: travel }, state, setpoint) {
   const { width, height } = place.getBoundingClientRect();
+  if (width === 0) return undefined; // not shown
   place.setAttribute('viewBox', `0 0 ${width} ${height}`);
   if (lengths.length === 0) {
     place.replaceChildren(svg('text', { x: width / 2, y: height / 2, 'text-anchor': 'middle' }, 'a linear model: no links to draw'));
@@ -65,6 +66,7 @@ function drawRig(place, { lengths_m: lengths, travel_m: travel }, state, setpoin
 // Axes and curves over time; `rows` has the time first.
 function drawCurves(place, curves, rows) {
   const { width, height } = place.getBoundingClientRect();
+  if (width === 0) return undefined; // not shown
   const [left, right, top, bottom] = [54, 8, 6, 18];
   place.setAttribute('viewBox', `0 0 ${width} ${height}`);
   const end = rows.at(-1)[0] || 1;
@@ -99,6 +101,7 @@ function drawCurves(place, curves, rows) {
 // Poles in the complex plane, on a scale that shows near and far ones: the square root of each distance.
 function drawPoles(place, poles) {
   const { width, height } = place.getBoundingClientRect();
+  if (width === 0) return undefined; // not shown
   place.setAttribute('viewBox', `0 0 ${width} ${height}`);
   const farthest = Math.max(...poles.map(([re, im]) => Math.max(Math.abs(re), Math.abs(im))), 1e-3);
   const near = (value) => Math.sign(value) * Math.sqrt(Math.abs(value) / farthest);

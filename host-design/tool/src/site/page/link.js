@@ -2,12 +2,12 @@
 
 const embedded = (id) => document.getElementById(id).textContent;
 
-// The module: base64 of its compressed bytes.
-async function moduleBytes() {
-  const text = atob(embedded('module').trim());
+// What is embedded as base64 of compressed bytes.
+async function inflated(id) {
+  const text = atob(embedded(id).trim());
   const packed = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
   const bytes = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
-  return new Response(bytes).arrayBuffer();
+  return new Uint8Array(await new Response(bytes).arrayBuffer());
 }
 
 // A thread that computes. Of several questions that wait, only the last of each kind is asked.
@@ -34,6 +34,14 @@ class Thread {
     this.waiting.delete(kind);
     this.waiting.set(kind, { question, take });
     this.next();
+  }
+
+  // Runs a rig, for the page at the other end of the port.
+  run(rig, theme, port, take) {
+    this.ready.then(() => {
+      this.asked = { take };
+      this.worker.postMessage({ id: 'run', rig, theme }, [port]);
+    });
   }
 
   answerTo(question) {

@@ -7,23 +7,25 @@ async function start() {
   ({ instance: { exports: exported } } = await WebAssembly.instantiate(bytes, {}));
 }
 
-function answered(question) {
-  const { memory, buffer, answer } = exported;
+// Asks the module's function `name`.
+function answered(name, question) {
+  const { memory, buffer } = exported;
   const text = new TextEncoder().encode(JSON.stringify(question));
   // The memory may be another one after each call.
   const at = buffer(text.length);
   new Uint8Array(memory.buffer, at, text.length).set(text);
-  const length = answer();
+  const length = exported[name]();
   const from = buffer(length);
   return JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, from, length)));
 }
 
-onmessage = async ({ data: { id, question, module } }) => {
+onmessage = async ({ data: { id, question, module, rig, theme }, ports: [port] }) => {
   const begin = performance.now();
   try {
     if (module !== undefined) bytes = module;
     if (exported === null) await start();
-    const answer = question === undefined ? {} : answered(question);
+    if (rig !== undefined) return postMessage({ id, answer: run(rig, theme, port), ms: performance.now() - begin });
+    const answer = question === undefined ? {} : answered('answer', question);
     postMessage({ id, answer, ms: performance.now() - begin });
   } catch (error) {
     // A module that has stopped cannot go on: the next question starts it again.

@@ -1,25 +1,13 @@
 // The page: puts connection, rig, scopes and controls together.
 
+import { useTheme } from './colours.js';
 import { connect } from './link.js';
 import { RigView } from './rig.js';
 import { Scopes } from './scope.js';
 import { Controls } from './controls.js';
 
 const byId = (id) => document.getElementById(id);
-const colours = new Map();
 let hello = null;
-
-// A colour of the style sheet; where it has none, as for curves in the light scheme, that of the tool's figures.
-export function colour(name) {
-  if (!colours.has(name)) {
-    const given = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-    const curve = /^--c([0-9])$/.exec(name);
-    const figure = curve !== null ? hello.colours[curve[1]] : { '--reference': hello.reference, '--limit': hello.limit }[name];
-    colours.set(name, given || figure);
-  }
-  return colours.get(name);
-}
-matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => colours.clear());
 
 const seen = { you: null, picture: null, telemetry: null, frames: 0, since: performance.now() };
 let view = null;
@@ -30,8 +18,8 @@ const ask = connect({
     hello = told;
     seen.you = you;
     byId('notice').hidden = true;
+    useTheme(hello.theme);
     if (view !== null) return; // connected again
-    colours.clear();
     scopes = new Scopes(byId('panels'), hello);
     view = new RigView(byId('rig'), byId('rail'), hello, {
       pull: (body, along, x, y) => controls.machine({ do: 'pull', body, along, x, y }),
@@ -45,6 +33,9 @@ const ask = connect({
     for (const telemetry of picture.telemetry) scopes.push(telemetry);
     seen.telemetry = picture.telemetry.at(-1) ?? seen.telemetry;
     controls.picture(picture, seen.telemetry, picture.commander === seen.you);
+  },
+  recorded(csv) {
+    byId('csv').href = csv;
   },
   notice(text) {
     byId('notice').textContent = text;

@@ -1,6 +1,6 @@
 // The rig to scale: draws it, and turns pointer and keys into pulls.
 
-import { colour } from './main.js';
+import { colour } from './colours.js';
 
 const NEAR_PX = 28; // how near the pointer has to be to a body
 const CART = { width: 0.14, height: 0.07 }; // in lengths of the chain

@@ -1,6 +1,6 @@
 // Scopes: curves over the last seconds, with zoom, a cursor and a picture.
 
-import { colour } from './main.js';
+import { colour, dash } from './colours.js';
 import { context } from './rig.js';
 
 const CAPACITY = 1 << 14; // telemetry messages that are kept
@@ -89,7 +89,7 @@ export class Scopes {
     legend.append(name);
     const values = curves.map((curve, i) => {
       const entry = document.createElement('span');
-      const style = `stroke: ${this.ink(i)}; stroke-width: 2; stroke-dasharray: ${this.dash(i).join(' ') || 'none'}`;
+      const style = `stroke: ${this.ink(i)}; stroke-width: 2; stroke-dasharray: ${dash(i).join(' ') || 'none'}`;
       const sample = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
       const stroke = document.createElementNS('http://www.w3.org/2000/svg', 'line');
       for (const [key, value] of Object.entries({ x1: 0, x2: 28, y1: 6, y2: 6 })) stroke.setAttribute(key, value);
@@ -123,8 +123,6 @@ export class Scopes {
   }
 
   ink(number) { return colour(`--c${number % 6}`); }
-
-  dash(number) { return this.hello.dashes[number % this.hello.dashes.length]; }
 
   push(telemetry) {
     const t = telemetry.tick * this.hello.tick_s;
@@ -168,7 +166,7 @@ export class Scopes {
     this.axes(draw, { x, y, low, high, begin, width, height });
     rows.forEach((row, i) => {
       draw.strokeStyle = this.ink(i);
-      draw.setLineDash(this.dash(i));
+      draw.setLineDash(dash(i));
       draw.lineWidth = 1.6;
       draw.beginPath();
       for (let k = from; k < to; k += 1) draw.lineTo(x(this.history.time(k)), y(row[k % CAPACITY]));

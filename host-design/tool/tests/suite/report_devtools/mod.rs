@@ -19,6 +19,8 @@ pub(crate) struct Browser {
     events: Vec<Value>,
     sent: u64,
     session: Option<String>,
+    /// Selector of the page inside the page in which expressions are evaluated; none for the page itself.
+    pub(crate) inside: Option<&'static str>,
     _profile: tempfile::TempDir,
 }
 
@@ -71,8 +73,16 @@ impl Browser {
                 }
             }
         });
-        let mut browser =
-            Self { process, input, messages, events: Vec::new(), sent: 0, session: None, _profile: profile };
+        let mut browser = Self {
+            process,
+            input,
+            messages,
+            events: Vec::new(),
+            sent: 0,
+            session: None,
+            inside: None,
+            _profile: profile,
+        };
         let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
         let attach = json!({ "targetId": target, "flatten": true });
         browser.session =
@@ -154,6 +164,12 @@ impl Browser {
 
     /// The value of an expression; waits for promises.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let expression = match self.inside {
+            Some(frame) => {
+                format!("with (document.querySelector('{frame}').contentWindow) {{ {expression} }}")
+            }
+            None => expression.to_owned(),
+        };
         let parameters = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let answer = self.call("Runtime.evaluate", parameters);
         assert!(answer["exceptionDetails"].is_null(), "{expression}: {answer}");
@@ -170,8 +186,9 @@ impl Browser {
             "Runtime.consoleAPICalled" => Some(event["params"]["args"].to_string()),
             "Network.requestWillBeSent" => {
                 let url = event["params"]["request"]["url"].as_str()?;
-                let is_own =
-                    ["file:", "data:", "blob:", "http://127.0.0.1:"].iter().any(|own| url.starts_with(own));
+                let is_own = ["file:", "data:", "blob:", "about:", "http://127.0.0.1:"]
+                    .iter()
+                    .any(|own| url.starts_with(own));
                 (!is_own).then(|| format!("request for {url}"))
             }
             _ => None,

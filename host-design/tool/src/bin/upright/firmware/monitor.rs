@@ -152,7 +152,7 @@ impl Conversation {
             std::thread::sleep(PICTURE);
             return Ok(());
         }
-        for telemetry in self.model.exchange(&mut self.line) {
+        for telemetry in self.line.carry(&mut self.model) {
             each(&json(&telemetry))?;
             if let Some(recorder) = &mut self.recorder {
                 recorder.push(&telemetry)?;

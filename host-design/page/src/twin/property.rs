@@ -6,7 +6,7 @@ use upright_design::verify::Disturbance;
 
 /// A property that can be changed while the rig runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Property {
+pub(crate) struct Property {
     /// Name in messages.
     name: &'static str,
     /// Name on the page.
@@ -56,14 +56,14 @@ const PROPERTIES: [Property; 13] = {
 
 /// The properties of a machine, and their current values.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Properties {
+pub struct Properties {
     all: [Property; PROPERTIES.len()],
     values: [f64; PROPERTIES.len()],
 }
 
 impl Properties {
     /// The properties of `rig` as designed for, with the disturbances that its file expects.
-    pub(super) fn of(rig: &Rig) -> Self {
+    pub fn of(rig: &Rig) -> Self {
         let mut all = PROPERTIES;
         for property in &mut all {
             if property.name == "force-noise" {
@@ -74,13 +74,13 @@ impl Properties {
     }
 
     /// All properties, as the page is told.
-    pub(super) fn described(&self) -> &[Property] {
+    pub(crate) fn described(&self) -> &[Property] {
         &self.all
     }
 
     /// Sets a property, within its range. Returns whether the machine has to be built again; `None` if there is no
     /// such property.
-    pub(super) fn set(&mut self, name: &str, value: f64) -> Option<bool> {
+    pub(crate) fn set(&mut self, name: &str, value: f64) -> Option<bool> {
         let index = self.all.iter().position(|property| property.name == name)?;
         let Property { low, high, rebuilds, .. } = self.all[index];
         self.values[index] = value.clamp(low, high);
@@ -88,17 +88,17 @@ impl Properties {
     }
 
     /// Current value of a property, in its unit; 0 if there is no such property.
-    pub(super) fn get(&self, name: &str) -> f64 {
+    pub(crate) fn get(&self, name: &str) -> f64 {
         self.all.iter().position(|property| property.name == name).map_or(0.0, |index| self.values[index])
     }
 
     /// Names and values.
-    pub(super) fn all(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+    pub(crate) fn all(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         self.all.iter().map(|property| property.name).zip(self.values)
     }
 
     /// The rig as it truly is: its file with these values in `[reality]`, and more viscous friction.
-    pub(super) fn applied_to(&self, rig: &Rig) -> Rig {
+    pub(crate) fn applied_to(&self, rig: &Rig) -> Rig {
         let mut rig = rig.clone();
         let Some(chain) = rig.chain_mut() else { return rig };
         chain.cart.friction_n_s_per_m += self.get("cart-viscous");

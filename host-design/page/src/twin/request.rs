@@ -5,7 +5,7 @@ use serde::Deserialize;
 /// A message of the page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case", deny_unknown_fields)]
-pub(super) enum PageRequest {
+pub enum PageRequest {
     /// Nothing: shows that the page is alive.
     Alive,
     /// To be in command, if nobody else is.
@@ -13,43 +13,89 @@ pub(super) enum PageRequest {
     /// To give up command.
     Release,
     /// A command to the firmware, in the words of the monitor: `arm`, `set-point 0.05`.
-    Say { line: String },
+    Say {
+        /// The command.
+        line: String,
+    },
     /// To start or stop a recording.
-    Record { on: bool },
+    Record {
+        /// Whether it begins.
+        on: bool,
+    },
     /// An action on the simulated machine.
-    Machine { what: MachineRequest },
+    Machine {
+        /// The action.
+        what: MachineRequest,
+    },
 }
 
 /// What can be done with a simulated machine.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
-pub(super) enum MachineRequest {
-    /// Pulls a body (0: cart, 1: first link …) at the fraction `along` of its length towards a point (m).
-    Pull { body: usize, along: f64, x: f64, y: f64 },
+pub enum MachineRequest {
+    /// Pulls a body towards a point.
+    Pull {
+        /// 0: cart, 1: first link …
+        body: usize,
+        /// Where on the link: 0 at its joint, 1 at its end.
+        along: f64,
+        /// The point, along the rail (m).
+        x: f64,
+        /// The point, up from the rail (m).
+        y: f64,
+    },
     /// Lets go of what is pulled.
     LetGo,
     /// Holds the rig by hand.
-    Hold { how: Holding },
+    Hold {
+        /// How.
+        how: Holding,
+    },
     /// Sets a property of the machine that the controller does not know.
-    Set { name: String, value: f64 },
+    Set {
+        /// Its name.
+        name: String,
+        /// Its value, in its unit.
+        value: f64,
+    },
     /// Begins a defect of the campaign, or mends the machine.
-    Defect { name: Option<String>, sensor: usize },
-    /// Speed of time: 1 is real time.
-    Speed { factor: f64 },
+    Defect {
+        /// Its name; none to mend the machine.
+        name: Option<String>,
+        /// At which sensor (0: cart).
+        sensor: usize,
+    },
+    /// Sets the speed of time.
+    Speed {
+        /// 1 is real time.
+        factor: f64,
+    },
     /// Stops simulated time, or resumes it.
-    Pause { on: bool },
+    Pause {
+        /// Whether time stops.
+        on: bool,
+    },
     /// Runs some ticks while time is stopped.
-    Step { ticks: u32 },
+    Step {
+        /// How many.
+        ticks: u32,
+    },
     /// Begins or ends the challenge.
-    Challenge { on: bool },
+    Challenge {
+        /// Whether it begins.
+        on: bool,
+    },
     /// Switches the power off and on.
-    Restart { upright: bool },
+    Restart {
+        /// Whether the rig is then raised by hand; otherwise it hangs.
+        upright: bool,
+    },
 }
 
 /// What a hand does with the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Holding {
+pub enum Holding {
     /// Nothing.
     Free,
     /// Lets the links hang, cart at the middle.

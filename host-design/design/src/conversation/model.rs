@@ -3,17 +3,16 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use crate::client::{AnyTelemetry, Client, ExpectedRig, Mismatch, Received, Unanswered};
+use crate::motion::posture_name;
+use crate::plant::absolute_angles;
 use upright::protocol::message::{Answer, CrashRecord, Info, Request, Statistics};
 use upright::supervision::fault::Cause;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
-use upright_design::client::{AnyTelemetry, Client, ExpectedRig, Mismatch, Received, Unanswered};
-use upright_design::motion::posture_name;
-use upright_design::plant::absolute_angles;
 
 use super::command::MonitorAction;
-use super::line::{SerialLine, now};
 use super::words;
 
 /// Time span of the plots (s).
@@ -266,19 +265,6 @@ impl Monitor {
         if now >= self.next_ask && !self.client.is_waiting() {
             self.send(if self.info.is_none() { Request::Info } else { Request::Statistics }, now);
             self.next_ask = now + STATISTICS;
-        }
-    }
-
-    /// Sends what is due over `line`, and receives for at most 5 ms; returns the telemetry. A line that fails ends the
-    /// conversation.
-    pub fn exchange(&mut self, line: &mut SerialLine) -> Vec<AnyTelemetry> {
-        self.poll(now());
-        match line.exchange(&self.take_outgoing(), &mut [0; 4096]) {
-            Ok(bytes) => self.receive(bytes, now()),
-            Err(error) => {
-                self.close(&error);
-                Vec::new()
-            }
         }
     }
 

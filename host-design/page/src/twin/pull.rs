@@ -5,19 +5,19 @@ use upright_design::rig::Chain;
 
 /// What is pulled, and where to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PulledPoint {
+pub(crate) struct PulledPoint {
     /// 0: cart, 1: first link …
-    pub(super) body: usize,
+    pub(crate) body: usize,
     /// Where on the link: 0 at its joint, 1 at its end.
-    pub(super) along: f64,
+    pub(crate) along: f64,
     /// Target position: along the rail and up from it (m).
-    pub(super) to: [f64; 2],
+    pub(crate) to: [f64; 2],
 }
 
 /// The spring between the pointer and a rig. With the mass that it moves it forms a damped oscillator, of 0.5 Hz for
 /// one link: a gentle pull, because the fault detection would mistake a hard one for a broken encoder.
 #[derive(Debug, Clone)]
-pub(super) struct Spring {
+pub(crate) struct Spring {
     lengths_m: Vec<f64>,
     masses_kg: Vec<f64>,
     total_kg: f64,
@@ -27,13 +27,13 @@ pub(super) struct Spring {
 
 /// What a spring does: a force on the rig where it is gripped (N), as a force on the cart and torques at the joints.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Pull {
+pub(crate) struct Pull {
     /// Along the rail, and up (N).
-    pub(super) force_n: [f64; 2],
+    pub(crate) force_n: [f64; 2],
     /// The generalised force on the cart (N).
-    pub(super) cart_n: f64,
+    pub(crate) cart_n: f64,
     /// The torques at the joints (N·m).
-    pub(super) torques_n_m: Vec<f64>,
+    pub(crate) torques_n_m: Vec<f64>,
 }
 
 /// Angular frequency of the spring with the mass that it moves, for one link (rad/s).
@@ -49,7 +49,7 @@ const DAMPED_PER_TICK: f64 = 0.3;
 
 impl Spring {
     /// The spring for the links of `chain`, recomputed every `period_s`.
-    pub(super) fn of(chain: &Chain, period_s: f64) -> Self {
+    pub(crate) fn of(chain: &Chain, period_s: f64) -> Self {
         let masses_kg: Vec<f64> = chain.links.iter().map(|link| link.mass_kg).collect();
         Self {
             lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
@@ -61,7 +61,7 @@ impl Spring {
     }
 
     /// The pull of `pulled` on the rig in `state` (`x, ẋ, θ_1, θ̇_1, …`).
-    pub(super) fn pull(&self, pulled: &PulledPoint, state: &[f64]) -> Pull {
+    pub(crate) fn pull(&self, pulled: &PulledPoint, state: &[f64]) -> Pull {
         let angles: Vec<f64> = absolute_angles(state).collect();
         let mut rate = 0.0;
         let rates: Vec<f64> = state

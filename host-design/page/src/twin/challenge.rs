@@ -13,7 +13,7 @@ const GROWTH: f64 = 0.1;
 
 /// A challenge; the page shows its score.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Challenge {
+pub(crate) struct Challenge {
     /// Time that the rig has been upright (s).
     upright_s: f64,
     /// Hardest push that it has survived (N).
@@ -32,7 +32,7 @@ pub(super) struct Challenge {
 
 impl Challenge {
     /// A challenge for a rig with this force limit (N).
-    pub(super) fn new(force_limit_n: f64, seed: u64) -> Self {
+    pub(crate) fn new(force_limit_n: f64, seed: u64) -> Self {
         Self {
             upright_s: 0.0,
             survived_n: 0.0,
@@ -45,7 +45,7 @@ impl Challenge {
     }
 
     /// Returns the force on the cart in the next tick (N). `survives`: the motor is on.
-    pub(super) fn tick(&mut self, survives: bool, period_s: f64) -> f64 {
+    pub(crate) fn tick(&mut self, survives: bool, period_s: f64) -> f64 {
         self.is_over |= !survives;
         if self.is_over {
             return 0.0;

@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
+use crate::client::AnyTelemetry;
 use serde_json::{Value, json};
-use upright_design::client::AnyTelemetry;
 
 /// One object with SI units; fault and arming inhibits by name.
 pub fn json(telemetry: &AnyTelemetry) -> Value {

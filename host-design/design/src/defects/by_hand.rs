@@ -1,10 +1,10 @@
 //! A defect that a person starts while the rig runs.
 
+use crate::harness::{Pins, Session};
+use crate::rig::Rig;
+use crate::simulate::Scenario;
+use crate::table::TableValues;
 use upright::board::Output;
-use upright_design::harness::{Pins, Session};
-use upright_design::rig::Rig;
-use upright_design::simulate::Scenario;
-use upright_design::table::TableValues;
 
 use super::defect::{Defect, Needs};
 use super::expected::Expected;

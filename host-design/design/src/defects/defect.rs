@@ -6,7 +6,6 @@ use upright::supervision::fault::Fault as F;
 use upright::supervision::inhibits::Inhibits;
 
 use super::expected::Expected::{self, *};
-use super::expected::Phase;
 use super::expected::Ticks::*;
 
 /// What must be there for a defect to be possible.
@@ -121,25 +120,22 @@ impl Defect {
         self.into()
     }
 
-    /// The outcome that it must have in a phase; some kinds prove nothing in a jog or while the rig is shaken.
-    pub(super) fn expected_in(self, phase: Phase) -> Expected {
-        let special = match phase {
-            Phase::Jogging => self.while_jogging(),
-            Phase::Shaken => self.while_shaken(),
-            Phase::Raising | Phase::Lowering if self == Self::Push => Some(Bounded),
-            Phase::Balancing | Phase::Raising | Phase::Lowering => None,
-        };
-        special.unwrap_or_else(|| self.expected())
-    }
-
     /// The fault inside the microcontroller, if it is one.
-    pub(super) fn inside_the_microcontroller(self) -> Option<InjectedFault> {
+    pub fn inside_the_microcontroller(self) -> Option<InjectedFault> {
         match self {
             Self::Panic => Some(InjectedFault::Panic),
             Self::HardFault => Some(InjectedFault::HardFault),
             Self::StackOverflow => Some(InjectedFault::StackOverflow),
             _ => None,
         }
+    }
+
+    /// Whether there is a guard that can be disabled: without it, the defect must be missed.
+    pub fn needs_guard(self) -> bool {
+        matches!(
+            self,
+            Self::WriteLost | Self::StalledTick | Self::LockUp | Self::StopBetweenTicks | Self::StackOverflow
+        )
     }
 
     /// Whether it is found by a threshold of the gain table: without thresholds it must be missed.

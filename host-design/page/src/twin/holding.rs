@@ -9,24 +9,24 @@ use super::request::Holding;
 
 /// How the rig is held, and the state in which it is.
 #[derive(Debug, Clone)]
-pub(super) struct ManualHold {
+pub(crate) struct ManualHold {
     how: Holding,
     rig: HeldRig,
 }
 
 impl ManualHold {
     /// Nothing is held.
-    pub(super) fn new(rig: &Rig) -> Self {
+    pub(crate) fn new(rig: &Rig) -> Self {
         Self { how: Holding::Free, rig: HeldRig::hanging(rig) }
     }
 
     /// How the rig is held.
-    pub(super) fn how(&self) -> Holding {
+    pub(crate) fn how(&self) -> Holding {
         self.how
     }
 
     /// Takes hold of the rig in `state`, or lets go.
-    pub(super) fn take(&mut self, how: Holding, state: &[f64]) {
+    pub(crate) fn take(&mut self, how: Holding, state: &[f64]) {
         if self.how == Holding::Free {
             self.rig.take(state);
             self.rig.stop();
@@ -36,7 +36,7 @@ impl ManualHold {
 
     /// The state in which the rig is held in the next tick; `None` if it is not. `state` is that of the rig now. While
     /// the motor pushes the cart, the rig is let go, and held again afterwards.
-    pub(super) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
+    pub(crate) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
         if status.state == State::Jogging {
             let how = std::mem::replace(&mut self.how, Holding::Free);
             self.take(how, state);

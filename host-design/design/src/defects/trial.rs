@@ -5,11 +5,11 @@ use rand_pcg::Pcg64;
 use upright::table::Law;
 
 use super::defect::Defect;
-use super::expected::{Expected, Phase};
-use upright_design::rig::Rig;
-use upright_design::simulate::{HandPush, Scenario, Sensing};
-use upright_design::table::{SwingUpValues, TableValues};
-use upright_design::verify::{Disturbance, PushSearch, VerifyError};
+use super::expected::Phase;
+use crate::rig::Rig;
+use crate::simulate::{HandPush, Scenario, Sensing};
+use crate::table::{SwingUpValues, TableValues};
+use crate::verify::{Disturbance, PushSearch, VerifyError};
 
 /// A defect, and the run that it happens in.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +48,18 @@ const AFTER_PUSH_S: f64 = 3.0;
 const COMMAND_TICKS: usize = 4;
 /// Time for which a raised rig balances before it is lowered (s).
 const UPRIGHT_S: f64 = 0.5;
+
+impl Defect {
+    /// Whether a rig with this table can have it.
+    pub fn is_possible(self, table: &TableValues) -> bool {
+        match self {
+            Self::SupplySag | Self::SupplyDip => table.limits.supply_min_v > 0.0,
+            Self::SupplySurge | Self::SupplySpike => table.motor.is_some(),
+            Self::LinkEncoderFrozen | Self::EncodersSwapped => table.sensors() > 1,
+            _ => true,
+        }
+    }
+}
 
 impl Trial {
     /// The trial `number` of a campaign: its kind is one of `kinds`, in turn. With a table that has a swing-up, the
@@ -157,11 +169,6 @@ impl Trial {
         let after = if is_raised { upright / 2 } else { 0 };
         let watched = (begin + ticks + after).saturating_sub(onset).max(1);
         Self { phase, scenario, onset, watched, ..self }
-    }
-
-    /// The outcome that it must have.
-    pub(super) fn expected(&self) -> Expected {
-        self.kind.expected_in(self.phase)
     }
 
     /// Generator of everything random after the onset.

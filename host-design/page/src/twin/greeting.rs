@@ -2,16 +2,15 @@
 
 use serde_json::{Value, json};
 use upright::supervision::supervisor::State;
+use upright_design::conversation::words;
+use upright_design::defects::{Defect, Needs};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 
 use super::property::Properties;
-use crate::campaign::Defect;
-use crate::figure::{CHROMATIC, curve_colour, curve_dash, limit_colour, reference_colour};
-use crate::monitor::words;
 
 /// The rig, its limits, and what can be done with it. `defects` are those that can begin; none if it is a real machine.
-pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Defect]>) -> Value {
+pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Defect]>) -> Value {
     let is_simulated = defects.is_some();
     let (lengths, travel) = match &rig.plant {
         PlantDescription::Chain(chain) => {
@@ -52,9 +51,13 @@ pub(super) fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Opt
         "defects": defects
             .map(|kind| json!({ "name": kind.name(), "meaning": kind.meaning(), "has_sensor": kind.has_sensor() }))
             .collect::<Vec<_>>(),
-        "colours": (0..CHROMATIC).map(curve_colour).collect::<Vec<_>>(),
-        "dashes": (0..CHROMATIC).map(curve_dash).collect::<Vec<_>>(),
-        "reference": reference_colour(),
-        "limit": limit_colour(),
     })
+}
+
+/// The defects that a person can begin in a rig with this table, whose firmware runs in this process.
+pub fn breakable(table: &TableValues) -> Vec<Defect> {
+    let can_begin = |kind: &Defect| {
+        kind.is_possible(table) && kind.can_begin_while_balancing() && kind.needs() != Needs::Image
+    };
+    Defect::ALL.iter().copied().filter(can_begin).collect()
 }

@@ -11,11 +11,11 @@ use upright::table::Thresholds;
 use super::defect::Defect;
 use super::expected::Phase;
 use super::trial::Trial;
-use upright_design::client::command_frame;
-use upright_design::harness::{Pins, Session};
-use upright_design::rig::Rig;
-use upright_design::simulate::Bench;
-use upright_design::table::{MAX_SENSORS, TableValues};
+use crate::client::command_frame;
+use crate::harness::{Pins, Session};
+use crate::rig::Rig;
+use crate::simulate::Bench;
+use crate::table::{MAX_SENSORS, TableValues};
 
 /// Duration of a push on the cart (s).
 const PUSH_S: f64 = 0.05;
@@ -28,8 +28,8 @@ const LONGEST_LATENESS: usize = 20;
 /// The raw counters of one tick.
 type Counters = heapless::Vec<u32, MAX_SENSORS>;
 
-/// The defect of a trial.
-pub(super) struct Injection<'a> {
+/// The defect of a trial, tick by tick.
+pub struct Injection<'a> {
     trial: Trial,
     table: &'a TableValues,
     random: Pcg64,
@@ -48,7 +48,8 @@ pub(super) struct Injection<'a> {
 }
 
 impl<'a> Injection<'a> {
-    pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
+    /// The defect of `trial` in a rig with this table.
+    pub fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
         let thresholds = match (&table.swing_up, trial.phase) {
             (None, _) | (_, Phase::Balancing | Phase::Jogging | Phase::Shaken) => &table.thresholds,
@@ -77,13 +78,13 @@ impl<'a> Injection<'a> {
     }
 
     /// Whether the host still sends keep-alives, `since` ticks after the onset.
-    pub(super) fn host_is_alive(&self, since: Option<usize>) -> bool {
+    pub fn host_is_alive(&self, since: Option<usize>) -> bool {
         self.trial.kind != Defect::HostSilent || since.is_none()
     }
 
     /// Changes what the firmware reads, `since` ticks after the onset; returns whether it differs visibly from a
     /// healthy rig.
-    pub(super) fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
+    pub fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
         let Trial { kind, sensor, sign, size, .. } = self.trial;
         let truth = inputs.raw_counts.clone();
         let began = self.at_onset.get_or_insert_with(|| truth.clone()).clone();
@@ -154,7 +155,7 @@ impl<'a> Injection<'a> {
     }
 
     /// Changes the output to the motor; returns whether the effect by now differs visibly from a healthy rig.
-    pub(super) fn output(&mut self, output: &mut Output) -> bool {
+    pub fn output(&mut self, output: &mut Output) -> bool {
         // The whole firmware gives no pulses.
         let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive else { return false };
         let asked = *command;
@@ -179,13 +180,13 @@ impl<'a> Injection<'a> {
     }
 
     /// External force on the cart (N).
-    pub(super) fn push_n(&self, since: usize) -> f64 {
+    pub fn push_n(&self, since: usize) -> f64 {
         let pushes = self.trial.kind == Defect::Push && since < self.push_ticks;
         if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }
     }
 
     /// Sends what the defect sends over the serial line, at the onset.
-    pub(super) fn serial(&mut self, session: &mut Session<'_>) {
+    pub fn serial(&mut self, session: &mut Session<'_>) {
         let Trial { kind, sign, size, .. } = self.trial;
         let disarm = |id: u64| command_frame(&Command { id, request: Request::Disarm });
         let mut next = disarm(session.last_id() + 1);

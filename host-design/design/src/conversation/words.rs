@@ -1,12 +1,12 @@
 //! States, sensors and instructions in words.
 
+use crate::client::AnyTelemetry;
 use upright::board::Contacts;
 use upright::protocol::message::CrashRecord;
 use upright::supervision::homing::Homing;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-use upright_design::client::AnyTelemetry;
 
 /// A state of the supervisor in words.
 pub fn state(state: State) -> &'static str {

@@ -1,0 +1,241 @@
+//! The twin of one page, in the page itself: some ticks at a time, as the page asks for them.
+
+use std::time::Duration;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use upright::table::Law;
+use upright_design::conversation::Monitor;
+use upright_design::harness::{HarnessError, endless_firmware};
+use upright_design::rig::Rig;
+use upright_design::simulate::{Scenario, Sensing};
+
+use super::console::Console;
+use super::greeting::{breakable, greeting};
+use super::property::Properties;
+use super::request::{MachineRequest, PageRequest};
+use super::simulated::{SimulatedMachine, World};
+use crate::designed::DeskDesign;
+use crate::question::FILE;
+use crate::refusal::{PageRefusal, failed};
+
+/// Time between two telemetry messages (s).
+pub const TELEMETRY_S: f32 = 0.005;
+/// Number of the only viewer.
+const VIEWER: u64 = 1;
+
+/// What the thread of a page asks its twin.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "twin", rename_all = "kebab-case")]
+enum TwinQuestion {
+    /// Switches the power of another rig on, raised or hanging. `since_1970_s` is the time (s).
+    Start { toml: String, motions: Option<String>, upright: bool, since_1970_s: f64 },
+    /// What the person asks for, then the ticks that are due after `passed_s` of real time, but at most `most_ticks`.
+    /// A person who `is_silent` for too long is no longer in command.
+    Run { asked: Vec<PageRequest>, passed_s: f64, most_ticks: u32, is_silent: bool },
+}
+
+/// The twin of a page; it answers questions in JSON with objects in JSON.
+///
+/// What begins with a new rig stays in memory until the program ends, so a page starts the program again for it.
+#[derive(Default)]
+pub struct InPage {
+    twin: Option<Twin>,
+}
+
+struct Twin {
+    machine: SimulatedMachine<'static>,
+    epoch: Duration,
+    console: Console,
+    world: Power,
+}
+
+/// Whether the machine runs.
+enum Power {
+    On(Box<World<'static, 'static>>),
+    /// The firmware has stopped, and why; properties for the next power-up.
+    Stopped(String, Box<Properties>),
+}
+
+impl InPage {
+    /// Answers `start` with `hello`, and `run` with a `picture`. A question that cannot be answered gives `failed`.
+    pub fn answer(&mut self, question: &str) -> String {
+        let answer = serde_json::from_str(question)
+            .map_err(PageRefusal::from)
+            .and_then(|question| self.answered(question));
+        answer.unwrap_or_else(|refusal| failed(&refusal)).to_string()
+    }
+
+    fn answered(&mut self, question: TwinQuestion) -> Result<Value, PageRefusal> {
+        match question {
+            TwinQuestion::Start { toml, motions, upright, since_1970_s } => {
+                let twin = Twin::start(&toml, motions.as_deref(), upright, since_1970_s)?;
+                let hello = twin.hello();
+                self.twin = Some(twin);
+                Ok(json!({ "hello": hello, "you": VIEWER }))
+            }
+            TwinQuestion::Run { asked, passed_s, most_ticks, is_silent } => {
+                let twin = self.twin.as_mut().ok_or(PageRefusal::NoTwin)?;
+                Ok(twin.run(asked, [passed_s, f64::from(most_ticks)], is_silent))
+            }
+        }
+    }
+}
+
+impl Twin {
+    fn start(
+        toml: &str,
+        motions: Option<&str>,
+        upright: bool,
+        since_1970_s: f64,
+    ) -> Result<Self, PageRefusal> {
+        let rig = Rig::from_toml(toml, FILE.as_ref())?;
+        rig.refuse_acceleration("twin")?;
+        let table = DeskDesign::of(&rig)?.table_with(&rig, motions)?;
+        let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
+        let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, law) };
+        let machine = SimulatedMachine {
+            rig: Box::leak(Box::new(rig)),
+            table: Box::leak(Box::new(table)),
+            scenario: Box::leak(Box::new(scenario)),
+        };
+        let epoch = Duration::try_from_secs_f64(since_1970_s).unwrap_or_default();
+        let world = powered(machine, Properties::of(machine.rig), upright, epoch)?;
+        let console = Console::new(Monitor::with_telemetry_every(TELEMETRY_S, &machine.rig.name));
+        Ok(Self { machine, epoch, console, world: Power::On(world) })
+    }
+
+    fn hello(&self) -> Value {
+        let SimulatedMachine { rig, table, .. } = self.machine;
+        greeting(rig, table, "this page", Some(&breakable(table)))
+    }
+
+    fn run(&mut self, asked: Vec<PageRequest>, [passed_s, most_ticks]: [f64; 2], is_silent: bool) -> Value {
+        let mut left = most_ticks as u32;
+        let mut goes_on = || {
+            let goes_on = left > 0;
+            left = left.saturating_sub(1);
+            goes_on
+        };
+        let Self { console, world, .. } = self;
+        let ran = match world {
+            Power::On(world) => {
+                asked.into_iter().try_for_each(|request| heard(request, world, console)).and_then(|()| {
+                    console.watch(is_silent, world.now());
+                    world.run(passed_s, console, &mut goes_on)?;
+                    Ok(world.restart())
+                })
+            }
+            // Nothing else can be done while the firmware is stopped.
+            Power::Stopped(..) => Ok(asked.iter().find_map(|request| match request {
+                PageRequest::Machine { what: MachineRequest::Restart { upright } } => Some(*upright),
+                _ => None,
+            })),
+        };
+        match ran {
+            Ok(None) => {}
+            Ok(Some(upright)) => self.switch_off_and_on(upright),
+            Err(error) => self.stop(&error),
+        }
+        self.shown()
+    }
+
+    fn shown(&mut self) -> Value {
+        let machine = match &self.world {
+            Power::On(world) => world.picture(),
+            Power::Stopped(why, _) => json!({ "stopped": why }),
+        };
+        let picture = self.console.picture(&machine, Some(VIEWER));
+        let csv = self.console.recorded().map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        json!({ "picture": picture, "csv": csv })
+    }
+
+    fn properties(&self) -> Properties {
+        match &self.world {
+            Power::On(world) => world.properties().clone(),
+            Power::Stopped(_, properties) => Properties::clone(properties),
+        }
+    }
+
+    fn stop(&mut self, error: &HarnessError) {
+        self.console.monitor.note(format!("{error}; switch the power off and on"));
+        self.world = Power::Stopped(error.to_string(), Box::new(self.properties()));
+    }
+
+    fn switch_off_and_on(&mut self, upright: bool) {
+        if let Power::On(world) = &self.world {
+            self.epoch = world.now();
+        }
+        match powered(self.machine, self.properties(), upright, self.epoch) {
+            Ok(world) => {
+                self.world = Power::On(world);
+                let monitor = Monitor::with_telemetry_every(TELEMETRY_S, &self.machine.rig.name);
+                self.console.begin_again(monitor);
+            }
+            Err(error) => self.stop(&error),
+        }
+    }
+}
+
+/// Carries out a request.
+fn heard(
+    request: PageRequest,
+    world: &mut World<'static, 'static>,
+    console: &mut Console,
+) -> Result<(), HarnessError> {
+    match request {
+        // The only viewer is always in command.
+        PageRequest::Alive | PageRequest::Command | PageRequest::Release => Ok(()),
+        PageRequest::Say { line } => {
+            console.say(&line, world.now());
+            Ok(())
+        }
+        PageRequest::Record { on } => {
+            console.record(on);
+            Ok(())
+        }
+        PageRequest::Machine { what } => world.carry_out(what, console),
+    }
+}
+
+/// The machine with its power on.
+fn powered(
+    machine: SimulatedMachine<'static>,
+    properties: Properties,
+    upright: bool,
+    epoch: Duration,
+) -> Result<Box<World<'static, 'static>>, HarnessError> {
+    let target = endless_firmware(machine.table)?;
+    Ok(Box::new(World::new(machine, target, properties, upright, epoch)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rig_that_was_broken_balances_again_after_the_power_was_switched_off_and_on() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../rigs/single-quanser-ip02.toml");
+        let toml = std::fs::read_to_string(file).unwrap();
+        let mut twin = InPage::default();
+        let mut ask =
+            |question: Value| -> Value { serde_json::from_str(&twin.answer(&question.to_string())).unwrap() };
+        let run = |what: Option<Value>| {
+            let asked: Vec<Value> =
+                what.iter().map(|what| json!({ "ask": "machine", "what": what })).collect();
+            json!({ "twin": "run", "asked": asked, "passed_s": 1.0, "most_ticks": 10_000, "is_silent": false })
+        };
+        // Negative control: without a rig, there is nothing to run.
+        assert!(ask(run(None))["failed"]["why"].as_str().unwrap().contains("no rig"));
+        let start = json!({ "twin": "start", "toml": toml, "upright": true, "since_1970_s": 1.7e9 });
+        assert_eq!(ask(start)["hello"]["rig"], "single-quanser-ip02");
+        let last = |answer: Value| {
+            answer["picture"]["telemetry"].as_array().unwrap().last().unwrap()["state"].clone()
+        };
+        assert_eq!(last(ask(run(None))), "Balancing");
+        let broken = json!({ "do": "defect", "name": "motor-reversed", "sensor": 0 });
+        assert_eq!(last(ask(run(Some(broken)))), "Fault");
+        ask(run(Some(json!({ "do": "restart", "upright": true }))));
+        assert_eq!(last(ask(run(None))), "Balancing");
+    }
+}

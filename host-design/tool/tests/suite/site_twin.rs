@@ -1,0 +1,172 @@
+//! Balancing in the page: the twin with the firmware itself, in Node and in a real browser, against this computer.
+//!
+//! Runs where `UPRIGHT_REQUIRE_WASM=1` is set.
+
+use serde_json::{Value, json};
+use upright_page::twin::InPage;
+
+use crate::report_devtools::Browser;
+use crate::site_bits::{in_node, is_wanted};
+use crate::site_page::{opened, root, type_in, until as until_designed};
+use crate::twin_page::{
+    FASTEST, MACHINE, STATE, catch_and_calibrate, click, let_pass, pull, set_speed, until, until_done,
+    until_state,
+};
+
+const FRAME: &str = "#twin iframe";
+
+fn read(file: &str) -> String {
+    std::fs::read_to_string(root().join("rigs").join(file)).unwrap()
+}
+
+/// What a person does: pulls the raised rig towards `x`, lowers it, raises it, and breaks an encoder.
+fn script(x: f64) -> Vec<Value> {
+    let (toml, motions) = (read("single-quanser-ip02.toml"), read("single-quanser-ip02.swing-up.json"));
+    let start =
+        json!({ "twin": "start", "toml": toml, "motions": motions, "upright": true, "since_1970_s": 1.7e9 });
+    let run = |asked: &[Value], pictures: usize| -> Vec<Value> {
+        let picture = |number: usize| {
+            let asked = if number == 0 { asked } else { &[] };
+            json!({ "twin": "run", "asked": asked, "passed_s": 0.02, "most_ticks": 1000, "is_silent": false })
+        };
+        (0..pictures).map(picture).collect()
+    };
+    let machine = |what: Value| json!({ "ask": "machine", "what": what });
+    let say = |line: &str| json!({ "ask": "say", "line": line });
+    [
+        vec![start],
+        run(&[machine(json!({ "do": "pull", "body": 1, "along": 1.0, "x": x, "y": 0.3 }))], 10),
+        run(&[machine(json!({ "do": "let-go" }))], 100),
+        run(&[say("down")], 300),
+        run(&[say("up")], 300),
+        run(&[machine(json!({ "do": "defect", "name": "encoder-wire-open", "sensor": 1 }))], 50),
+    ]
+    .concat()
+}
+
+fn here(script: &[Value]) -> Vec<Value> {
+    let mut twin = InPage::default();
+    script.iter().map(|question| serde_json::from_str(&twin.answer(&question.to_string())).unwrap()).collect()
+}
+
+/// The states of the firmware in turn, and the last fault.
+fn history(answers: &[Value]) -> (Vec<String>, Value) {
+    let pictures = answers.iter().filter_map(|answer| answer["picture"]["telemetry"].as_array());
+    let mut states: Vec<String> =
+        pictures.flatten().map(|telemetry| telemetry["state"].as_str().unwrap().to_owned()).collect();
+    states.dedup();
+    (states, answers.last().unwrap()["picture"]["fault"]["name"].clone())
+}
+
+#[test]
+fn a_rig_balanced_in_webassembly_has_the_telemetry_and_motion_of_this_computer_bit_by_bit() {
+    if !is_wanted("the twin in WebAssembly") {
+        return;
+    }
+    let asked = script(0.02);
+    let (here, there) = (here(&asked), in_node(&asked));
+    let (states, fault) = history(&here);
+    eprintln!("{states:?}, {fault}");
+    assert_eq!(
+        states,
+        ["Balancing", "Lowering", "Calibrated", "Raising", "Balancing", "Fault"],
+        "{:?}",
+        here.iter().map(|answer| &answer["picture"]["log"]).collect::<Vec<_>>()
+    );
+    for (number, (here, there)) in here.iter().zip(&there).enumerate() {
+        assert!(here["failed"].is_null(), "{here}");
+        assert_eq!(here, there, "answer {number}");
+    }
+    // Negative control: a pull that differs in the last bit is noticed.
+    let other = in_node(&script(0.02f64.next_up()));
+    assert_eq!(other[0], there[0]);
+    assert_ne!(other[1..], there[1..]);
+}
+
+/// Switches the designed rig on: raised, or hanging.
+fn balance(browser: &mut Browser, raised: bool) {
+    browser.inside = None;
+    browser.value(&format!("document.getElementById('raised').checked = {raised}"));
+    until_designed(browser, "!document.getElementById('balance').disabled");
+    click(browser, "#balance");
+    until(browser, &format!("document.querySelector('{FRAME}')?.contentWindow?.upright?.seen?.picture"));
+    browser.inside = Some(FRAME);
+}
+
+#[test]
+fn the_papers_rig_is_balanced_pulled_broken_and_put_back_in_the_page() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    balance(&mut browser, true);
+    until_state(&mut browser, "Balancing");
+    let_pass(&mut browser, 1.0);
+    // Four links survive little: the cart is pulled.
+    let pulled = pull(&mut browser, 0, 6.0, 0.4);
+    assert_eq!(pulled["body"], 0, "{pulled}");
+    let_pass(&mut browser, 3.0);
+    assert_eq!(browser.value(STATE), "Balancing", "{}", browser.value("upright.seen.picture.fault"));
+
+    // The same defect gives the same fault here.
+    let defect =
+        json!({ "ask": "machine", "what": { "do": "defect", "name": "encoder-wire-open", "sensor": 2 } });
+    let start = json!({ "twin": "start", "toml": read("quadruple-paper.toml"), "upright": true, "since_1970_s": 1.7e9 });
+    let run = json!({ "twin": "run", "asked": [defect], "passed_s": 0.5, "most_ticks": 10_000, "is_silent": false });
+    let native = here(&[start, run]);
+    let native = &native[1]["picture"]["fault"];
+    browser.value("{ document.getElementById('sensor').value = 2; }");
+    browser.value("[...document.querySelectorAll('#defects button')].find((button) => button.textContent === 'encoder wire open').click()");
+    until_state(&mut browser, "Fault");
+    let fault = browser.value("upright.seen.picture.fault");
+    assert_eq!([&fault["code"], &fault["at"]], [&native["code"], &native["at"]], "{fault} {native}");
+
+    // Put back, and recorded.
+    click(&mut browser, "[data-restart=upright]");
+    until_state(&mut browser, "Balancing");
+    browser.value(
+        "{ window.made = []; URL.createObjectURL = (blob) => { window.made.push(blob); return 'blob:x'; }; }",
+    );
+    click(&mut browser, "#record");
+    until(&mut browser, "upright.seen.picture.recording");
+    let_pass(&mut browser, 1.0);
+    click(&mut browser, "#record");
+    until(&mut browser, "window.made.length === 1");
+    let csv = browser.value("window.made[0].text()");
+    let rows: Vec<&str> = csv.as_str().unwrap().lines().collect();
+    assert!(rows[0].starts_with("tick,state") && rows.len() > 100, "{} rows, {}", rows.len(), rows[0]);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn a_hanging_single_is_homed_checked_jogged_and_raised_in_the_page_with_keys_alone() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    type_in(&mut browser, &read("single-quanser-ip02.toml"));
+    until_designed(&mut browser, "upright.desk.design?.states === 4");
+    // The stored motions come out of the page as they went in.
+    let motions = browser.value("upright.motions()");
+    let stored: Value = serde_json::from_str(&read("single-quanser-ip02.swing-up.json")).unwrap();
+    assert_eq!(
+        serde_json::from_str::<Value>(motions.as_str().unwrap()).unwrap().to_string(),
+        stored.to_string()
+    );
+    balance(&mut browser, false);
+    until_state(&mut browser, "Disarmed");
+    catch_and_calibrate(&mut browser);
+    browser.key("f");
+    set_speed(&mut browser, FASTEST);
+    until_done(&mut browser, "w", &format!("({STATE}) === 'Raising' || ({STATE}) === 'Balancing'"));
+    until_state(&mut browser, "Balancing");
+    let_pass(&mut browser, 1.0);
+    assert_eq!(browser.value(STATE), "Balancing");
+    let upright = browser.value(&format!("Math.abs({MACHINE}.state[2])"));
+    assert!(upright.as_f64().is_some_and(|angle| angle < 0.05), "{upright}");
+    set_speed(&mut browser, 1.0);
+    let pulled = pull(&mut browser, 1, 4.0, 0.4);
+    assert_eq!(pulled["body"], 1, "{pulled}");
+    let_pass(&mut browser, 2.0);
+    assert_eq!(browser.value(STATE), "Balancing");
+    browser.key("Escape");
+    until(&mut browser, &format!("({STATE}) !== 'Balancing'"));
+    browser.inside = None;
+    click(&mut browser, "#close");
+    assert_eq!(browser.value("document.querySelector('main').hidden"), false);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
