@@ -152,3 +152,23 @@ fn a_changed_table_keeps_the_motor_off() {
     let table_fault = Some(upright::supervision::fault::Fault::Table);
     assert!(telemetry.iter().all(|at| at.fault == table_fault), "{:?}", telemetry[0].fault);
 }
+
+/// Whether this operation in an image is the compiler's, by the names in its ELF file. The ROM's take subnormals as 0,
+/// which only a rig at rest would show.
+fn is_compilers(elf: &[u8], operation: &str) -> bool {
+    let mut names = elf.split(|&byte| byte == 0).filter_map(|name| std::str::from_utf8(name).ok());
+    names.any(|name| name.contains("compiler_builtins") && name.ends_with(operation))
+}
+
+#[test]
+#[ignore = "builds the image"]
+fn sums_and_products_are_the_compilers_and_not_those_of_the_rom() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let elf = std::fs::read(uf2.with_extension("elf")).unwrap();
+    for operation in ["__addsf3", "__mulsf3", "__divsf3"] {
+        assert!(is_compilers(&elf, operation), "{operation}");
+    }
+    // Negative control: what `rp2040-hal` puts in their place without its feature `disable-intrinsics`.
+    assert!(!is_compilers(b"\0_RNvNtCs_10rp2040_hal_10intrinsics8___addsf3\0", "__addsf3"));
+}
