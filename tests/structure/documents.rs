@@ -5,7 +5,7 @@ use std::path::Path;
 /// README.md, ARCHITECTURE.md and the pages in `docs/`, each.
 const MOST_WORDS_OF_A_PAGE: usize = 2000;
 /// All of them together.
-const MOST_WORDS: usize = 23_500;
+const MOST_WORDS: usize = 22_000;
 
 /// The words of a page, of which each has a letter or a digit. Tables and listings that a test compares with the code,
 /// between `<!-- name -->` and `<!-- /name -->`, are not counted.
@@ -68,7 +68,7 @@ fn no_guide_is_too_long_nor_all_together() {
     let page = |count| (format!("{count}.md"), "word ".repeat(count));
     assert_eq!(too_long(&[page(1999)]), [""; 0]);
     assert_eq!(too_long(&[page(2000)]), ["2000.md: 2000 words"]);
-    assert_eq!(too_long(&vec![page(1000); 24]), ["all guides: 24000 words"]);
+    assert_eq!(too_long(&vec![page(1000); 23]), ["all guides: 23000 words"]);
 }
 
 #[test]

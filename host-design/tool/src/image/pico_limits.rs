@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn the_guide_has_the_cycles_that_the_check_uses() {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-        let guide = std::fs::read_to_string(Path::new(root).join("docs/pico.md")).unwrap();
+        let guide = std::fs::read_to_string(Path::new(root).join("docs/results/pico.md")).unwrap();
         for links in 0..4 {
             let cell = |cycles: u32| {
                 let ms = f64::from(cycles) / CLOCK_HZ * 1e3;
@@ -81,7 +81,7 @@ mod tests {
             };
             let (balancing, motion) = (PICO_BALANCING_CYCLES[links], PICO_MOTION_CYCLES[links]);
             let row = format!("| {} | {} | {} |", links + 1, cell(balancing), cell(motion));
-            assert!(guide.contains(&row), "docs/pico.md: {row}");
+            assert!(guide.contains(&row), "docs/results/pico.md: {row}");
         }
     }
 
