@@ -4,6 +4,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <stdint.h>
+#include <util/atomic.h>
 #include <util/delay.h>
 
 static volatile uint32_t given; // all pulses so far: those along +x added, the others subtracted
@@ -33,10 +34,8 @@ ISR(TIMER1_COMPA_vect)
 // The counts of the timer. Its two bytes must not be read with an interrupt between them.
 static uint16_t timer(void)
 {
-    uint8_t flags = SREG;
-    cli();
-    uint16_t counts = TCNT1;
-    SREG = flags;
+    uint16_t counts;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { counts = TCNT1; }
     return counts;
 }
 
@@ -65,9 +64,7 @@ static bool give(int32_t pulses, uint16_t until)
 
 static uint32_t pulses_given(void)
 {
-    uint8_t flags = SREG;
-    cli();
-    uint32_t counts = given;
-    SREG = flags;
+    uint32_t counts;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { counts = given; }
     return counts;
 }
