@@ -26,9 +26,7 @@ fn machine(rig: &Rig, number: u8) -> Rig {
     reality.parameters.parameter_spread_percent = 10.0;
     reality.parameters.parameter_seed = number;
     let gravity = chain.gravity_m_per_s2;
-    let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
-    reality.friction.cart_friction_n =
-        random.random_range(0.0..0.008) * (chain.cart.mass_kg.unwrap_or_default() + links) * gravity;
+    reality.friction.cart_friction_n = random.random_range(0.0..0.008) * chain.total_mass_kg() * gravity;
     let moment = |mass_kg: f64, length_m: f64| 0.5 * mass_kg * length_m * gravity;
     let frictions =
         chain.links.iter().map(|link| random.random_range(0.0..0.002) * moment(link.mass_kg, link.length_m));

@@ -68,9 +68,7 @@ impl Feed {
         let ticks = (duration_s / period_s) as u32;
         let peak_n =
             (0..ticks).map(|tick| excitation.sines_n(f64::from(tick) * period_s).abs()).fold(0.0, f64::max);
-        let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
-        let jolt_m_per_s =
-            pulse_n * (PULSES_S[0][1] - PULSES_S[0][0]) / (chain.cart.mass_kg.unwrap_or_default() + links);
+        let jolt_m_per_s = pulse_n * (PULSES_S[0][1] - PULSES_S[0][0]) / chain.total_mass_kg();
         Ok(Self {
             excitation,
             period_s,

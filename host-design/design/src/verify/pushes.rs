@@ -7,7 +7,7 @@ use super::error::{VerifyError, chain};
 use super::imperfections::first;
 use super::trial::{Disturbance, Horizon, disturbed, trial};
 use crate::parallel;
-use crate::rig::{Chain, Rig};
+use crate::rig::Rig;
 use crate::simulate::{FallKind, HandPush, Scenario, SimulationError};
 use crate::table::TableValues;
 
@@ -84,7 +84,8 @@ impl PushSearch<'_> {
     /// # Errors
     /// [`VerifyError`] for a model, and if a run cannot be started.
     pub fn first(&self, is_supervised: bool) -> Result<Option<(f64, FallKind)>, VerifyError> {
-        let weight_n = weight_n(chain(self.rig, "pushes")?);
+        let chain = chain(self.rig, "pushes")?;
+        let weight_n = chain.gravity_m_per_s2 * chain.total_mass_kg();
         let start = START * (DURATIONS_S[0] / self.push.duration_s).min(1.0);
         let mut ended = None;
         let found =
@@ -110,10 +111,4 @@ impl PushSearch<'_> {
         let outcome = trial(self.rig, self.table, &scenario, &Horizon::default())?;
         Ok(outcome.fall.map(|fall| fall.kind))
     }
-}
-
-/// The weight of cart and links (N).
-fn weight_n(chain: &Chain) -> f64 {
-    let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
-    chain.gravity_m_per_s2 * (chain.cart.mass_kg.unwrap_or_default() + links)
 }

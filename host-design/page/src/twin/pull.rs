@@ -50,11 +50,10 @@ const DAMPED_PER_TICK: f64 = 0.3;
 impl Spring {
     /// The spring for the links of `chain`, recomputed every `period_s`.
     pub(crate) fn of(chain: &Chain, period_s: f64) -> Self {
-        let masses_kg: Vec<f64> = chain.links.iter().map(|link| link.mass_kg).collect();
         Self {
             lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
-            total_kg: chain.cart.mass_kg.unwrap_or_default() + masses_kg.iter().sum::<f64>(),
-            masses_kg,
+            total_kg: chain.total_mass_kg(),
+            masses_kg: chain.links.iter().map(|link| link.mass_kg).collect(),
             gravity_m_per_s2: chain.gravity_m_per_s2,
             period_s,
         }

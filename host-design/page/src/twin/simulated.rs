@@ -76,10 +76,7 @@ impl<'a, 't> World<'a, 't> {
         let output = if upright { harness.raise(None)? } else { Output::OFF };
         let period_s = rig.tick.period_s;
         let (spring, total_kg) = match &rig.plant {
-            PlantDescription::Chain(chain) => {
-                let links: f64 = chain.links.iter().map(|link| link.mass_kg).sum();
-                (Some(Spring::of(chain, period_s)), chain.cart.mass_kg.unwrap_or_default() + links)
-            }
+            PlantDescription::Chain(chain) => (Some(Spring::of(chain, period_s)), chain.total_mass_kg()),
             PlantDescription::Model(_) => (None, 1.0),
         };
         let mut hold = ManualHold::new(rig);

@@ -127,6 +127,14 @@ pub struct Chain {
     pub input: CartInput,
 }
 
+impl Chain {
+    /// Mass of the cart and all links (kg); a cart whose mass is not given counts nothing.
+    pub fn total_mass_kg(&self) -> f64 {
+        let links_kg: f64 = self.links.iter().map(|link| link.mass_kg).sum();
+        self.cart.mass_kg.unwrap_or_default() + links_kg
+    }
+}
+
 impl PlantDescription {
     /// Number of states: 2n + 2 for n links, or the order of the model.
     pub fn states(&self) -> usize {
