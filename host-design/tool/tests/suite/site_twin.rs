@@ -113,7 +113,7 @@ fn the_papers_rig_is_balanced_pulled_broken_and_put_back_in_the_page() {
     let native = here(&[start, run]);
     let native = &native[1]["picture"]["fault"];
     browser.value("{ document.getElementById('sensor').value = 2; }");
-    browser.value("[...document.querySelectorAll('#defects button')].find((button) => button.textContent === 'encoder wire open').click()");
+    click(&mut browser, "[data-defect=encoder-wire-open]");
     until_state(&mut browser, "Fault");
     let fault = browser.value("upright.seen.picture.fault");
     assert_eq!([&fault["code"], &fault["at"]], [&native["code"], &native["at"]], "{fault} {native}");
