@@ -258,6 +258,7 @@ async function begin() {
   checker = new Thread(module);
   designer = new Thread(module);
   twin = new Twin(module, (why) => tell(why, true));
+  new Lessons((name) => open(examples.find((example) => example.name === name)?.toml ?? null), (question) => designer.answerTo(question));
   changed();
 }
 
