@@ -121,6 +121,20 @@ impl<'m> Grid<'m> {
         }
         zeros
     }
+
+    /// Frequencies at which |L| = 1 (rad per tick).
+    fn crossovers(&self) -> Vec<f64> {
+        self.zeros(|r| r.t.norm_sqr() - r.s.norm_sqr())
+    }
+
+    /// The smallest delay (ticks) that turns L to -1 at a crossover; infinite if there is none.
+    fn lag_ticks(&self) -> f64 {
+        let lags = self
+            .crossovers()
+            .into_iter()
+            .filter_map(|omega| Some(self.model.response(omega)?.lag().rem_euclid(2.0 * PI) / omega));
+        lags.fold(f64::INFINITY, f64::min)
+    }
 }
 
 fn golden(f: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
@@ -164,17 +178,10 @@ pub(super) fn margins(
     let lowest_gain = factors.iter().copied().filter(|&g| g < 1.0).fold(0.0, f64::max);
     let highest_gain = factors.iter().copied().filter(|&g| g > 1.0).min_by(f64::total_cmp);
 
-    let crossovers = grid.zeros(|r| r.t.norm_sqr() - r.s.norm_sqr());
-    let mut phase_margin_rad = None::<f64>;
-    let mut delay_guess = f64::INFINITY;
-    for &omega in &crossovers {
-        let Some(response) = model.response(omega) else { continue };
-        let l = -response.l();
-        let lag = l.im.atan2(l.re);
-        phase_margin_rad = Some(phase_margin_rad.map_or(lag.abs(), |least| least.min(lag.abs())));
-        delay_guess = delay_guess.min(lag.rem_euclid(2.0 * PI) / omega);
-    }
-    let delay_margin_ticks = delay_margin(certified, numbers, tick_s, delay_guess)?;
+    let crossovers = grid.crossovers();
+    let lags = crossovers.iter().filter_map(|omega| Some(model.response(*omega)?.lag().abs()));
+    let phase_margin_rad = lags.min_by(f64::total_cmp);
+    let delay_margin_ticks = delay_margin(certified, numbers, tick_s, grid.lag_ticks())?;
     let sensitivity = grid.maximum(|_, r| r.s.norm_sqr().sqrt());
     let complementary = grid.maximum(|_, r| r.t.norm_sqr().sqrt());
     let disk = grid.maximum(|_, r| (r.s - r.t).norm_sqr().sqrt());
@@ -193,20 +200,45 @@ pub(super) fn margins(
     })
 }
 
-/// The smallest further delay (ticks) at which the sampled loop is unstable, by a scan around what the phase at the
-/// crossovers suggests (`guess`, ticks) and bisection to 1e-9.
+/// The smallest further delay (ticks) at which the sampled loop is unstable, to a relative 1e-9. `guess` is what the
+/// phase at the crossovers suggests (ticks).
 fn delay_margin(
     certified: &Certified,
     numbers: &Numbers<f64>,
     tick_s: f64,
     guess: f64,
 ) -> Result<Option<f64>, VerifyError> {
+    /// Each tick of delay is one more state, and the eigenvalues of n states take n³ operations.
+    const MOST_TICKS_AS_STATES: f64 = 40.0;
     if !guess.is_finite() {
         return Ok(None);
+    }
+    if guess > MOST_TICKS_AS_STATES {
+        return long_delay_margin(certified, numbers, tick_s, guess).map(Some);
     }
     let unstable = |further: f64| Ok(radius(&delayed_loop(certified, numbers, tick_s, further))? >= 1.0);
     let step = (guess / 24.0).max(1e-3);
     first_failure(unstable, |i| step * f64::from(i), 72, 1e-9).map(|found| found.map(|bracket| bracket.1))
+}
+
+/// A long delay margin (ticks). Whole ticks only turn the phase; so the fraction of a tick is part of the model, and the
+/// crossovers of that model say how many ticks there are. They depend little on the fraction: a few rounds agree.
+fn long_delay_margin(
+    certified: &Certified,
+    numbers: &Numbers<f64>,
+    tick_s: f64,
+    mut ticks: f64,
+) -> Result<f64, VerifyError> {
+    for _ in 0..50 {
+        let fraction = ticks.fract();
+        let model = delayed_loop(certified, numbers, tick_s, fraction);
+        let next = fraction + Grid::of(&model)?.lag_ticks();
+        if (next - ticks).abs() <= 1e-9 * ticks {
+            break;
+        }
+        ticks = next;
+    }
+    Ok(ticks)
 }
 
 /// The loop with a further delay of the force, in ticks.

@@ -20,6 +20,12 @@ impl Response {
     pub fn l(&self) -> Complex<f64> {
         self.t / self.s
     }
+
+    /// Phase of L above that of -1 (rad, -π to π): what may be lost where |L| = 1.
+    pub(super) fn lag(&self) -> f64 {
+        let l = -self.l();
+        l.im.atan2(l.re)
+    }
 }
 
 impl LoopModel<f64> {

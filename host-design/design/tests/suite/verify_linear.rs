@@ -127,6 +127,24 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
 }
 
 #[test]
+fn a_delay_margin_of_many_ticks_is_that_of_the_eigenvalues() {
+    for period_s in [0.015, 0.011] {
+        let text = format!(
+            "name = \"slow\"\n[model]\na = [[0, 1], [0, 0]]\nb = [0, 1]\n[tick]\nperiod_s = {period_s}\n\
+             [lqr]\nstate_weights = [1, 1]\nforce_weight = 1\n"
+        );
+        let rig = Rig::from_toml(&text, Path::new("slow.toml")).unwrap();
+        let (certified, table) = designed(&rig);
+        let report = linear(&rig, certified, &table).unwrap().remove(0);
+        let model = LoopModel::<f64>::as_it_runs(certified, &table, report.law);
+        let ticks = report.margins.unwrap().delay_margin_ticks.unwrap();
+        assert!(ticks > 40.0, "{ticks}");
+        assert!(radius_with_delay(&model, ticks.floor() as usize) < 1.0, "{ticks}");
+        assert!(radius_with_delay(&model, ticks.ceil() as usize) > 1.0, "{ticks}");
+    }
+}
+
+#[test]
 fn the_loop_is_on_the_edge_at_its_margins_and_nowhere_before() {
     for rig in [rig("quadruple-paper.toml"), rig("single-quanser-ip02.toml"), model_rig("1", "")] {
         let (certified, table) = designed(&rig);
