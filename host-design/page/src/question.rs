@@ -10,6 +10,7 @@ use upright_design::table::gains_source;
 
 use crate::designed::{DeskDesign, ShownRun};
 use crate::fingerprint::{Fingerprint, PullRounding};
+use crate::lesson::Exercise;
 use crate::refusal::{PageRefusal, failed};
 use crate::sketch;
 
@@ -38,6 +39,8 @@ enum Asked {
     Design(ShownRun),
     /// The poles of the loops, which take as long as the gains.
     Poles,
+    /// Whether this answer to an exercise is right.
+    Mark { exercise: Exercise, answer: Vec<f64> },
     /// The gain table as Rust source, as `upright design` writes it.
     Table,
     /// Table and controller as a C header, as `upright export` writes it.
@@ -76,6 +79,7 @@ impl Desk {
             }
             Asked::Design(run) => self.designed(&question.toml, &rig)?.gains_and_run(&rig, run),
             Asked::Poles => self.designed(&question.toml, &rig)?.poles(&rig),
+            Asked::Mark { exercise, answer } => exercise.marked(&question.toml, answer),
             Asked::Table => {
                 let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
                 Ok(json!({ "text": gains_source(&rig, &table) }))

@@ -36,6 +36,10 @@ pub(crate) enum PageRefusal {
     ForceOnly(#[from] ForceOnly),
     #[error("no rig is under power: start one")]
     NoTwin,
+    #[error("{0}")]
+    Twin(String),
+    #[error("give {0} numbers, with blanks between them")]
+    Answer(usize),
 }
 
 /// A refusal as an answer: what to do, and for an error in the rig file its line and column.

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use upright::supervision::supervisor::State;
 use upright_design::conversation::words;
-use upright_design::defects::{Defect, Needs};
+use upright_design::defects::{Defect, Expected, Needs, Ticks};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 
@@ -43,15 +43,46 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "soft_m": table.limits.rail_m,
         "angle_limit_rad": table.limits.angle_rad,
         "force_limit_n": table.force_limit_n,
+        "step": table.observer.as_ref()
+            .map(|observer| observer.step.iter().take(table.sensors()).copied().collect::<Vec<_>>()),
         "sensors": (0..table.sensors()).map(|sensor| words::joint(sensor as u8)).collect::<Vec<_>>(),
         "laws": table.laws.present().map(|(law, _)| json!({ "name": law.option(), "title": law.title(), "value": law }))
             .collect::<Vec<Value>>(),
         "states": states.map(|state| json!({ "state": state, "text": words::state(state) })),
         "properties": if is_simulated { json!(Properties::of(rig).described()) } else { json!([]) },
         "defects": defects
-            .map(|kind| json!({ "name": kind.name(), "meaning": kind.meaning(), "has_sensor": kind.has_sensor() }))
+            .map(|&kind| json!({ "name": kind.name(), "meaning": kind.meaning(), "group": group(kind), "must": must(kind) }))
             .collect::<Vec<_>>(),
     })
+}
+
+/// The heading under which a page shows a defect.
+fn group(kind: Defect) -> &'static str {
+    match kind {
+        kind if kind.has_sensor() || kind == Defect::CartEncoderFrozen => "Encoders",
+        Defect::MotorDead | Defect::MotorReversed | Defect::MotorStuck | Defect::MotorWeak => "Motor",
+        Defect::SupplyNotANumber | Defect::SupplySag | Defect::SupplyDip | Defect::SupplySurge => "Supply",
+        Defect::SupplySpike => "Supply",
+        Defect::EmergencyStop | Defect::DriverFault | Defect::LimitSwitch => "Contacts",
+        Defect::OneOverrun | Defect::Overruns | Defect::Push => "Time and touch",
+        _ => "Serial line",
+    }
+}
+
+/// What the firmware has to do, in few words.
+fn must(kind: Defect) -> String {
+    match kind.expected() {
+        Expected::Fault(_, Ticks::Exactly(1)) => "off in the same tick".to_owned(),
+        Expected::Fault(_, Ticks::Exactly(ticks)) => format!("off in {ticks} ticks"),
+        Expected::Fault(_, Ticks::Supply | Ticks::Link) => "off after a time limit".to_owned(),
+        Expected::Off(ticks) => format!("off, at best in {ticks} ticks"),
+        Expected::Counted => "ignored, and counted".to_owned(),
+        Expected::Ignored => "ignored".to_owned(),
+        Expected::Changed | Expected::Bounded => "off before it is far off".to_owned(),
+        Expected::Survived => "survived".to_owned(),
+        Expected::Refused(_) | Expected::LetGo | Expected::Found(_) => "refused".to_owned(),
+        Expected::Dead => "off at once".to_owned(),
+    }
 }
 
 /// The defects that a person can begin in a rig with this table, whose firmware runs in this process.

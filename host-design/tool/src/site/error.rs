@@ -23,6 +23,14 @@ pub enum SiteError {
     /// The compiler reports errors.
     #[error("the page's module cannot be built; the compiler says:\n{0}")]
     Compiler(String),
+    /// A file is no exercise.
+    #[error("{}: {why}", path.display())]
+    Lesson {
+        /// Path of the file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// A file cannot be read or written.
     #[error("{}: {source}", path.display())]
     File {

@@ -5,12 +5,13 @@
 //! the bits of this computer's.
 //!
 //! ```
-//! let page = upright_tool::site::page(b"the module", &[]);
+//! let page = upright_tool::site::page(b"the module", &[], &[]);
 //! assert!(page.contains("default-src 'none'"));
 //! ```
 
 mod error;
 mod examples;
+mod lessons;
 mod module;
 mod motions;
 mod page;
@@ -18,5 +19,6 @@ mod twin;
 
 pub use error::SiteError;
 pub use examples::examples;
+pub use lessons::lessons;
 pub use module::module;
 pub use page::{Example, page};

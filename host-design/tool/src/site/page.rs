@@ -4,6 +4,7 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use upright_page::Lesson;
 
 use super::motions::packed;
 use super::twin::{TwinPage, bare};
@@ -12,12 +13,13 @@ use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
 const WORKER: &str = concat!(include_str!("page/worker.js"), include_str!("page/running.js"));
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("page/link.js"),
     include_str!("page/motions.js"),
     include_str!("page/drawing.js"),
     include_str!("page/editor.js"),
     include_str!("page/balance.js"),
+    include_str!("page/lessons.js"),
     include_str!("page/desk.js"),
 ];
 
@@ -35,11 +37,11 @@ pub struct Example {
     pub motions: Option<String>,
 }
 
-/// The page with this module and these examples.
+/// The page with this module, these examples and these exercises.
 ///
 /// Its content security policy lets it run the scripts and styles in it, which it names by their hashes, and the
 /// module; it cannot ask any computer for anything.
-pub fn page(module: &[u8], examples: &[Example]) -> String {
+pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
     let script = bare(&format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat()));
@@ -58,6 +60,7 @@ pub fn page(module: &[u8], examples: &[Example]) -> String {
         ("{policy}", policy),
         ("{style}", style),
         ("{examples}", embedded(&shown)),
+        ("{lessons}", embedded(&lessons)),
         ("{worker}", embedded(&bare(WORKER))),
         ("{twin}", embedded(&twin.html)),
         ("{theme}", embedded(&page_theme())),
@@ -132,9 +135,9 @@ mod tests {
     #[test]
     fn the_page_holds_all_of_its_parts_and_asks_for_nothing() {
         let toml = "name = \"</script>\"".to_owned();
-        let page = page(b"module", &[Example { name: "mine".to_owned(), toml, motions: None }]);
+        let page = page(b"module", &[Example { name: "mine".to_owned(), toml, motions: None }], &[]);
         assert!(page.contains("default-src 'none'") && page.contains("<\\/script>"));
-        assert_eq!(page.matches("</script>").count(), 7);
+        assert_eq!(page.matches("</script>").count(), 8);
         assert!(page.trim_end().ends_with("</html>"), "a mark is missing in the page");
         for request in ["src=\"", "@import", "fetch(", "XMLHttpRequest", "https://", "url("] {
             assert!(!page.contains(request), "{request}");

@@ -4,7 +4,8 @@ use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::twin::assets::{ASSETS, Asset};
 
 /// The modules of its script, each after those that it imports.
-const MODULES: [&str; 6] = ["colours.js", "link.js", "rig.js", "scope.js", "controls.js", "main.js"];
+const MODULES: [&str; 8] =
+    ["colours.js", "link.js", "guide.js", "rig.js", "scope.js", "controls.js", "drawers.js", "main.js"];
 
 /// The twin's page in one document.
 pub(super) struct TwinPage {

@@ -16,14 +16,16 @@ pub(crate) struct Asset {
 const SCRIPT: &str = "text/javascript";
 
 /// All files of the page.
-pub(crate) const ASSETS: [Asset; 9] = [
+pub(crate) const ASSETS: [Asset; 11] = [
     Asset { name: "", media_type: "text/html", content: include_str!("page/page.html") },
     Asset { name: "colours.css", media_type: "text/css", content: COLOURS_CSS },
     Asset { name: "page.css", media_type: "text/css", content: include_str!("page/page.css") },
     Asset { name: "main.js", media_type: SCRIPT, content: include_str!("page/main.js") },
     Asset { name: "colours.js", media_type: SCRIPT, content: include_str!("page/colours.js") },
     Asset { name: "link.js", media_type: SCRIPT, content: include_str!("page/link.js") },
+    Asset { name: "guide.js", media_type: SCRIPT, content: include_str!("page/guide.js") },
     Asset { name: "rig.js", media_type: SCRIPT, content: include_str!("page/rig.js") },
     Asset { name: "scope.js", media_type: SCRIPT, content: include_str!("page/scope.js") },
     Asset { name: "controls.js", media_type: SCRIPT, content: include_str!("page/controls.js") },
+    Asset { name: "drawers.js", media_type: SCRIPT, content: include_str!("page/drawers.js") },
 ];

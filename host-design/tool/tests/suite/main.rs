@@ -41,6 +41,7 @@ mod split_command;
 mod stepper_command;
 mod transitions_command;
 mod twin_access;
+mod twin_guide;
 mod twin_page;
 mod verify_command;
 mod virtual_board;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use upright_page::Desk;
-use upright_tool::site::{examples, module, page};
+use upright_tool::site::{examples, lessons, module, page};
 
 use crate::report_devtools::Browser;
 use crate::site_bits::is_wanted;
@@ -53,7 +53,8 @@ pub(crate) fn opened() -> Option<(Browser, tempfile::TempDir)> {
     let mut browser = is_wanted(what).then(|| Browser::for_test_of(what)).flatten()?;
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("index.html");
-    let text = page(&module().unwrap(), &examples(&root().join("rigs")).unwrap());
+    let (examples, lessons) = (examples(&root().join("rigs")), lessons(&root().join("lessons")));
+    let text = page(&module().unwrap(), &examples.unwrap(), &lessons.unwrap());
     std::fs::write(&file, &text).unwrap();
     let compressed = miniz_oxide::deflate::compress_to_vec(text.as_bytes(), 9).len();
     eprintln!("the page has {} bytes, {compressed} compressed", text.len());
@@ -84,6 +85,24 @@ fn a_rig_is_designed_and_exported_in_the_page_as_on_the_command_line() {
     // Negative control: the policy keeps the page from asking anybody.
     browser.value("fetch('data:,hello').catch(() => 0)");
     assert!(browser.errors().iter().any(|error| error.contains("Content Security Policy")));
+}
+
+#[test]
+fn an_answer_to_an_exercise_is_marked_in_the_page() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    browser.value("document.querySelectorAll('#lesson-list button')[0].click()");
+    until(&mut browser, "upright.desk.design.states === 4 && !document.getElementById('lesson').hidden");
+    let mut mark = |answer: &str, said: &str| {
+        browser.value(&format!(
+            "{{ document.getElementById('answer').value = '{answer}'; document.getElementById('mark').click(); }}"
+        ));
+        until(&mut browser, &format!("document.getElementById('marked').textContent.startsWith('{said}')"));
+    };
+    // Negative control: wrong gains, and too few.
+    mark("0 0 150 0", "Not yet");
+    mark("1 2", "give 4 numbers");
+    mark("-40 -45 150 27", "Right");
+    assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
 #[test]

@@ -173,7 +173,9 @@ fn a_link_that_is_pulled_comes_back_and_one_that_is_pulled_too_far_is_a_fault_th
     let_pass(&mut browser, 1.0);
     assert_eq!(browser.value(STATE), "Balancing");
     // The emergency key works wherever the focus is.
+    click(&mut browser, "[data-tab=controls]");
     browser.value("document.getElementById('setpoint').focus()");
+    assert_eq!(browser.value("document.activeElement.id"), "setpoint");
     browser.key("Escape");
     until(&mut browser, &format!("({STATE}) !== 'Balancing'"));
     assert_eq!(browser.errors(), Vec::<String>::new());

@@ -258,6 +258,11 @@ async function begin() {
   checker = new Thread(module);
   designer = new Thread(module);
   twin = new Twin(module, (why) => tell(why, true));
+  const begins = (name) => {
+    byId('example').value = name;
+    open(examples.find((example) => example.name === name)?.toml ?? null);
+  };
+  new Lessons(begins, (question) => designer.answerTo(question));
   changed();
 }
 

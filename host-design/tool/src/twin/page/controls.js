@@ -1,10 +1,12 @@
-// Buttons, sliders and keys.
+// What a person does with buttons and keys, and what the page says.
+
+import { bodyName, newtons, STEPS } from './guide.js';
 
 const byId = (id) => document.getElementById(id);
 
 // Keys of the whole page that send a command to the firmware.
 const KEYS = {
-  h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear', w: 'up', s: 'down',
+  h: 'home', H: 'home-rail', g: 'check-signs', a: 'arm', d: 'disarm', c: 'clear', s: 'down',
 };
 // Keys that work while they are held.
 const HELD = { m: 'jog +x', M: 'jog -x' };
@@ -12,15 +14,6 @@ const HELD = { m: 'jog +x', M: 'jog -x' };
 const REPEAT_MS = 25;
 const HOLDS = { f: 'free', j: 'hanging', k: 'guided', u: 'upright' };
 const KEPT_LINES = 200;
-
-function button(text, title, action) {
-  const element = document.createElement('button');
-  element.type = 'button';
-  element.textContent = text;
-  element.title = title;
-  element.addEventListener('click', action);
-  return element;
-}
 
 function option(value, text) {
   const element = document.createElement('option');
@@ -35,20 +28,29 @@ function write(element, text) {
 }
 
 export class Controls {
-  constructor(ask) {
-    this.ask = ask;
+  constructor(ask, wish) {
+    Object.assign(this, { ask, wish, act: null, pressed: null, isSimulated: false });
     this.scopes = null;
     this.say = (line) => ask({ ask: 'say', line });
     this.machine = (what) => ask({ ask: 'machine', what });
     this.isPaused = false;
     this.held = null;
     this.isRecording = false;
-    this.sliders = new Map();
     this.listen();
   }
 
   listen() {
-    byId('stop').addEventListener('click', () => this.say('disarm'));
+    byId('stop').addEventListener('click', () => this.stop());
+    byId('act').addEventListener('pointerdown', () => {
+      this.pressed = this.act;
+      if (this.act?.held !== undefined) this.hold(this.act.held);
+    });
+    // What a finger was put on for something else is not done when it is lifted.
+    byId('act').addEventListener('click', ({ detail }) => { if (detail === 0 || this.pressed === this.act) this.go(this.act); });
+    for (const end of ['pointerup', 'pointerleave', 'pointercancel']) byId('act').addEventListener(end, () => this.letGo());
+    for (const element of document.querySelectorAll('[data-wish]')) {
+      element.addEventListener('click', () => this.wish.set(element.dataset.wish, this.isSimulated));
+    }
     for (const element of document.querySelectorAll('[data-line]')) {
       element.addEventListener('click', () => this.say(element.dataset.line));
     }
@@ -68,12 +70,7 @@ export class Controls {
     byId('challenge').addEventListener('click', (event) => {
       this.machine({ do: 'challenge', on: event.currentTarget.getAttribute('aria-pressed') !== 'true' });
     });
-    byId('nominal').addEventListener('click', () => {
-      for (const [name, { nominal }] of this.sliders) this.machine({ do: 'set', name, value: nominal });
-    });
-    byId('mend').addEventListener('click', () => this.machine({ do: 'defect', name: null, sensor: 0 }));
     byId('record').addEventListener('click', () => this.ask({ ask: 'record', on: !this.isRecording }));
-    byId('command').addEventListener('click', () => this.ask({ ask: 'command' }));
     byId('hold').addEventListener('click', () => this.holdScopes());
     byId('zoom-in').addEventListener('click', () => this.scopes.zoom(0.5));
     byId('zoom-out').addEventListener('click', () => this.scopes.zoom(2));
@@ -95,10 +92,22 @@ export class Controls {
     window.addEventListener('blur', () => this.letGo());
   }
 
+  stop() {
+    this.wish.cancel();
+    this.say('disarm');
+  }
+
+  // Does what the page offers.
+  go(act) {
+    if (act === null || act.held !== undefined) return;
+    if (act.wish !== undefined) this.wish.set(act.wish, this.isSimulated);
+    for (const request of act.asks ?? []) this.ask(request);
+  }
+
   stopKey(event) {
     const isSpace = event.key === ' ' && !['INPUT', 'SELECT', 'BUTTON', 'A'].includes(document.activeElement?.tagName);
     if (event.key !== 'Escape' && !isSpace) return;
-    this.say('disarm');
+    this.stop();
     event.preventDefault();
     event.stopPropagation();
   }
@@ -117,6 +126,8 @@ export class Controls {
   key(event) {
     if (event.ctrlKey || event.altKey || event.metaKey || ['INPUT', 'SELECT'].includes(event.target.tagName)) return;
     if (KEYS[event.key] !== undefined) this.say(KEYS[event.key]);
+    else if (event.key === 'w') this.wish.set('up', this.isSimulated);
+    else if (event.key === 'b' && this.isSimulated) this.machine({ do: 'restart', upright: true });
     else if (HELD[event.key] !== undefined && !event.repeat) this.hold(HELD[event.key]);
     else if (HOLDS[event.key] !== undefined) this.machine({ do: 'hold', how: HOLDS[event.key] });
     else if (event.key === 'p') this.machine({ do: 'pause', on: !this.isPaused });
@@ -128,7 +139,7 @@ export class Controls {
     const isHeld = !this.scopes.isHeld;
     this.scopes.hold(isHeld);
     byId('hold').setAttribute('aria-pressed', isHeld);
-    byId('scroll').disabled = !isHeld;
+    byId('scroll').hidden = !isHeld;
     byId('scroll').value = 0;
   }
 
@@ -136,41 +147,24 @@ export class Controls {
     this.scopes = scopes;
     document.title = `${hello.rig}: twin`;
     byId('name').textContent = hello.rig;
-    byId('place').textContent = `firmware: ${hello.place}`;
+    byId('place').textContent = `${hello.is_simulated ? 'simulated rig, real firmware' : 'firmware'}: ${hello.place}`;
+    this.isSimulated = hello.is_simulated;
     document.querySelectorAll('.simulated').forEach((element) => { element.hidden = !hello.is_simulated; });
     document.querySelectorAll('.swing-up').forEach((element) => { element.hidden = !hello.has_swing_up; });
     byId('law').replaceChildren(...hello.laws.map(({ name, title }) => option(name, title)));
     this.laws = hello.laws;
     [byId('setpoint').min, byId('setpoint').max] = hello.soft_m;
-    this.states = new Map(hello.states.map(({ state, text }) => [state, text]));
-    byId('sensor').replaceChildren(...hello.sensors.map((name, sensor) => option(sensor, name)));
-    byId('defects').replaceChildren(...hello.defects.map(({ name, meaning, has_sensor: hasSensor }) => button(
-      name.replaceAll('-', ' '), meaning + (hasSensor ? ', at the chosen sensor' : ''),
-      () => this.machine({ do: 'defect', name, sensor: Number(byId('sensor').value) }),
-    )));
-    this.sliders.clear();
-    byId('properties').replaceChildren(...hello.properties.map((property) => this.slider(property)));
-  }
-
-  slider({ name, label, unit, low, high, step, nominal }) {
-    const element = document.createElement('label');
-    element.className = 'property';
-    const [value, input] = [document.createElement('output'), document.createElement('input')];
-    Object.assign(input, { type: 'range', min: low, max: high, step, value: nominal, name });
-    input.addEventListener('input', () => this.machine({ do: 'set', name, value: Number(input.value) }));
-    element.append(label, value, input);
-    this.sliders.set(name, { element, value, input, unit, nominal });
-    return element;
+    byId('steps').replaceChildren(...STEPS.map((textContent) => Object.assign(document.createElement('li'), { textContent })));
   }
 
   picture(picture, latest, isCommander) {
     const { machine } = picture;
-    byId('command').hidden = isCommander || picture.commander !== null;
     document.body.classList.toggle('looks-only', !isCommander);
     this.isRecording = picture.recording;
     byId('record').setAttribute('aria-pressed', picture.recording);
     if (picture.recording) byId('csv').hidden = false;
     write(byId('span'), `${Number(this.scopes.span.toPrecision(3))} s`);
+    write(byId('at'), this.scopes.cursor === null ? 'now' : `at ${this.scopes.cursor.toFixed(3)} s`);
     const log = byId('log');
     for (const line of picture.log) {
       const entry = document.createElement('li');
@@ -178,18 +172,39 @@ export class Controls {
       log.prepend(entry);
     }
     while (log.childElementCount > KEPT_LINES) log.lastElementChild.remove();
-    this.fault(picture.fault);
     if (latest !== null) this.telemetry(latest, picture.wanted_m);
-    if (machine?.stopped !== undefined) write(byId('state'), machine.stopped);
-    else if (machine !== null) this.simulation(machine);
-    if (picture.ended !== null) write(byId('state'), picture.ended);
+    if (machine !== null && machine.stopped === undefined) this.simulation(machine);
+  }
+
+  // Shows where the rig is on its way, what it waits for, and the act that goes on; after a fault what happened.
+  guided(now, latest, fault, fall) {
+    const state = byId('state');
+    write(state, now.line);
+    if (latest !== null && state.dataset.state !== latest.state) state.dataset.state = latest.state;
+    write(byId('below'), now.below ?? '');
+    [...byId('steps').children].forEach((element, step) => {
+      const mark = step < now.step || (step === now.step && now.isDone) ? '✓' : step === now.step && now.isLost ? '×' : String(step + 1);
+      if (element.dataset.mark !== mark) element.dataset.mark = mark;
+      if ((element.getAttribute('aria-current') !== null) !== (step === now.step)) element.toggleAttribute('aria-current', step === now.step);
+    });
+    // While a finger is on the button, it stays what it was.
+    if (this.held === null) this.offer(now.act ?? null, now.isDone === true);
+    this.fault(fault, fall);
+  }
+
+  offer(act, isDone) {
+    const element = byId('act');
+    const isSame = act?.text === this.act?.text && act?.key === this.act?.key;
+    if (isSame && element.hidden === (act === null)) return;
+    this.act = act;
+    element.hidden = act === null;
+    if (act === null) return;
+    const key = Object.assign(document.createElement('kbd'), { textContent: act.key ?? '' });
+    element.replaceChildren(`${act.text} `, key);
+    element.classList.toggle('waits', !isDone);
   }
 
   telemetry(latest, wanted) {
-    const state = byId('state');
-    write(state, this.states.get(latest.state) ?? latest.state);
-    state.dataset.state = latest.state;
-    write(byId('now'), latest.now === null ? '' : `now: ${latest.now}`);
     write(byId('inputs'), latest.inputs);
     const isOn = ['Jogging', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
@@ -204,37 +219,39 @@ export class Controls {
     if (document.activeElement !== byId('setpoint')) byId('setpoint').value = setpoint;
   }
 
-  fault(fault) {
+  fault(fault, fall) {
     const place = byId('fault');
-    const text = fault === null ? '' : `${fault.code} ${fault.name}${fault.at === null ? '' : ` at the ${fault.at}`}: ${fault.condition}. Remedy: ${fault.remedy}`;
+    const at = fault?.at ? ` (${fault.at})` : '';
+    const text = fault === null ? '' : `${fault.code} ${fault.name}${at}`;
     place.hidden = fault === null;
-    if (place.textContent === text) return;
-    place.replaceChildren();
-    if (fault === null) return;
-    const name = document.createElement('strong');
-    name.textContent = text.slice(0, text.indexOf(':'));
-    place.append(name, text.slice(text.indexOf(':')));
+    if (place.dataset.text === text) return;
+    place.dataset.text = text;
+    const said = (title, words) => {
+      const paragraph = document.createElement('p');
+      paragraph.append(Object.assign(document.createElement('b'), { textContent: title }), words);
+      return paragraph;
+    };
+    if (fault === null) return place.replaceChildren();
+    const why = fall?.defect ? `Broken on purpose: ${fall.defect.replaceAll('-', ' ')}. `
+      : fall?.pull ? `You pulled ${bodyName(fall.pull.body)} with up to ${newtons(fall.pull.n)}. ` : '';
+    const since = this.isSimulated ? 'It falls freely. Dashed: where the motor went off. Nothing is estimated any more; dotted curves are the true motion.'
+      : 'Nothing is estimated any more; dotted curves are what the encoders say, if they can still be trusted.';
+    const code = Object.assign(document.createElement('small'), { textContent: `Fault ${text}` });
+    return place.replaceChildren(said('What happened: ', `${why}The firmware saw: ${fault.condition}.`), said('Since then: ', since), said('Remedy: ', fall?.pull ? `pull more gently. At a bench: ${fault.remedy}.` : `${fault.remedy}.`), code);
   }
 
   simulation(machine) {
     this.isPaused = machine.paused;
     byId('pause').setAttribute('aria-pressed', machine.paused);
     const isBehind = !machine.paused && machine.speed < 0.95 * machine.factor;
-    write(byId('measured-speed'), machine.paused ? `stopped at ${machine.t_s.toFixed(3)} s`
-      : `${machine.speed.toFixed(2)} × real time${isBehind ? ': this computer is too slow' : ''}`);
+    const speed = machine.factor === 1 && !isBehind ? '' : `, ${machine.speed.toFixed(2)} × real time`;
+    write(byId('measured-speed'), `${machine.t_s.toFixed(machine.paused ? 3 : 1)} s${machine.paused ? '' : speed}${isBehind ? ': this computer is too slow' : ''}`);
     for (const element of document.querySelectorAll('[data-hold]')) {
       element.setAttribute('aria-pressed', element.dataset.hold === machine.holding);
     }
-    write(byId('defect'), machine.defect === null ? '' : machine.defect.replaceAll('-', ' '));
     const { challenge } = machine;
     byId('challenge').setAttribute('aria-pressed', challenge !== null);
     write(byId('score'), challenge === null ? '' : `upright for ${challenge.upright_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
       challenge.is_over ? '; it fell' : `, push of ${Math.abs(challenge.push_n).toFixed(1)} N`}`);
-    for (const [name, { element, value, input, unit, nominal }] of this.sliders) {
-      const now = machine.properties[name];
-      write(value, `${Number(now.toPrecision(4))} ${unit}`);
-      element.classList.toggle('changed', now !== nominal);
-      if (document.activeElement !== input) input.value = now;
-    }
   }
 }

@@ -2,14 +2,17 @@
 
 import { useTheme } from './colours.js';
 import { connect } from './link.js';
+import { guide, isEstimated, isHomed, isOn, Wish, Witness } from './guide.js';
 import { RigView } from './rig.js';
 import { Scopes } from './scope.js';
 import { Controls } from './controls.js';
+import { Drawers } from './drawers.js';
 
 const byId = (id) => document.getElementById(id);
-let hello = null;
+const MOTOR_MS = 150; // time between two texts of the motor's force
 
-const seen = { you: null, picture: null, telemetry: null, frames: 0, since: performance.now() };
+const seen = { you: null, picture: null, telemetry: null, frames: 0, step: 0, since: -MOTOR_MS };
+let hello = null;
 let view = null;
 let scopes = null;
 
@@ -20,19 +23,30 @@ const ask = connect({
     byId('notice').hidden = true;
     useTheme(hello.theme);
     if (view !== null) return; // connected again
-    scopes = new Scopes(byId('panels'), hello);
+    scopes = new Scopes(byId('panels'), byId('axis'), hello);
     view = new RigView(byId('rig'), byId('rail'), hello, {
       pull: (body, along, x, y) => controls.machine({ do: 'pull', body, along, x, y }),
       letGo: () => controls.machine({ do: 'let-go' }),
       moveTo: (x) => controls.say(`set-point ${Math.min(hello.soft_m[1], Math.max(hello.soft_m[0], x)).toFixed(4)}`),
     });
     controls.hello(hello, scopes);
+    drawers.hello(hello);
   },
   picture(picture) {
     seen.picture = picture;
-    for (const telemetry of picture.telemetry) scopes.push(telemetry);
+    for (const telemetry of picture.telemetry) scopes.push(telemetry, picture.machine);
     seen.telemetry = picture.telemetry.at(-1) ?? seen.telemetry;
-    controls.picture(picture, seen.telemetry, picture.commander === seen.you);
+    const { telemetry: latest } = seen;
+    const isCommander = picture.commander === seen.you;
+    if (latest !== null) {
+      witness.see(picture, latest);
+      wish.take(latest);
+    }
+    controls.picture(picture, latest, isCommander);
+    drawers.picture(picture.machine);
+    const now = guide({ hello, picture, latest, wish: wish.name, fall: witness.fall, step: seen.step, isCommander });
+    seen.step = now.step;
+    controls.guided(now, latest, picture.fault, witness.fall);
   },
   recorded(csv) {
     byId('csv').href = csv;
@@ -43,25 +57,46 @@ const ask = connect({
   },
   lost() {
     seen.picture = null;
-    byId('state').textContent = 'no connection: the motor is turned off without it';
+    byId('state').textContent = 'No connection: the motor is turned off without it';
+    byId('act').hidden = true;
     delete byId('state').dataset.state;
   },
 });
-const controls = new Controls(ask);
+const wish = new Wish(ask);
+const witness = new Witness();
+const controls = new Controls(ask, wish);
+const drawers = new Drawers((what) => controls.machine(what));
+
+// Frame and tag of the picture: whether the motor is on.
+function motor(latest, force) {
+  const state = latest.state === 'Fault' ? 'fault' : isOn(latest) ? 'on' : 'off';
+  if (byId('stage').dataset.motor !== state) byId('stage').dataset.motor = state;
+  else if (performance.now() - seen.since < MOTOR_MS) return;
+  seen.since = performance.now();
+  byId('motor').textContent = { fault: '✕ Motor off: fault', off: '○ Motor off' }[state]
+    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} N ${force < 0 ? '←' : '→'}`;
+}
 
 function frame() {
   requestAnimationFrame(frame);
-  if (view === null || seen.picture === null) return;
-  const { machine, wanted_m: wanted } = seen.picture;
-  const state = machine?.state ?? seen.telemetry?.estimate;
-  if (state !== undefined) {
-    view.draw(state, wanted ?? seen.telemetry?.setpoint_m ?? null, machine?.pull);
-    view.pull();
-  }
+  const { picture, telemetry: latest } = seen;
+  if (view === null || picture === null || latest === null) return;
+  const { machine, wanted_m: wanted } = picture;
+  const state = machine?.state ?? scopes.measured(latest);
+  motor(latest, latest.applied_n);
+  view.draw(state, wanted ?? latest.setpoint_m, machine?.pull, {
+    isOn: isOn(latest),
+    isKnown: isHomed(latest) || latest.state === 'Fault',
+    isUp: ['Balancing', 'Armed'].includes(latest.state),
+    force_n: latest.applied_n,
+    fallen: witness.fall?.state ?? null,
+    t_s: machine?.t_s ?? latest.tick * hello.tick_s,
+  });
+  view.pull();
   scopes.drawNext();
   seen.frames += 1;
 }
 requestAnimationFrame(frame);
 
 // For tests, and for the curious.
-globalThis.upright = { seen, view: () => view, scopes: () => scopes };
+globalThis.upright = { seen, view: () => view, scopes: () => scopes, isEstimated };

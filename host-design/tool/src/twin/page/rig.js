@@ -1,10 +1,15 @@
 // The rig to scale: draws it, and turns pointer and keys into pulls.
 
 import { colour } from './colours.js';
+import { newtons } from './guide.js';
 
 const NEAR_PX = 28; // how near the pointer has to be to a body
 const CART = { width: 0.14, height: 0.07 }; // in lengths of the chain
 const KEY_PULL = 0.35; // pull by an arrow key, in lengths of the chain
+// Part of the way to where the camera is aimed that it moves in a frame; with reduced motion, it cuts.
+const GLIDE = matchMedia('(prefers-reduced-motion: reduce)').matches ? 1 : 0.12;
+const TRAIL_S = GLIDE === 1 ? 0.7 : 1.5;
+const TO_SHRINK = 0.55; // smallest scale at which the whole rail is shown, as a part of the usual one
 
 // Joints of the chain: its foot, then the end of each link (m).
 export function joints(lengths, state) {
@@ -37,8 +42,9 @@ export class RigView {
   constructor(canvas, rail, hello, act) {
     Object.assign(this, { canvas, rail, hello, act });
     this.reach = hello.lengths_m.reduce((sum, length) => sum + length, 0);
-    this.centre = 0;
+    this.camera = null;
     this.state = null;
+    this.trail = [];
     this.grip = null;
     this.body = hello.lengths_m.length;
     this.keys = new Set();
@@ -46,18 +52,31 @@ export class RigView {
   }
 
   // CSS pixels per metre.
-  get scale() {
-    return Math.min(this.canvas.clientHeight / (2.5 * this.reach), this.canvas.clientWidth / (2.2 * this.reach));
+  get scale() { return this.camera.scale; }
+
+  // Aims the camera: the upright half while it balances, else the full circle; the whole rail, if it fits.
+  aim(state, isUp) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const [low, high] = this.travel();
+    const usual = Math.min(height / ((isUp ? 1.6 : 2.5) * this.reach), width / ((isUp ? 1.2 : 2.2) * this.reach));
+    const whole = (0.92 * width) / (high - low);
+    const fits = whole > TO_SHRINK * usual;
+    const wanted = { scale: fits ? Math.min(usual, whole) : usual, x: fits ? (low + high) / 2 : state[0], y: isUp ? 0.45 * this.reach : 0 };
+    this.rail.hidden = fits;
+    if (this.camera === null) this.camera = wanted;
+    // It does not move while the person pulls.
+    if (this.grip !== null || this.keys.size > 0) return;
+    for (const name of Object.keys(wanted)) this.camera[name] += GLIDE * (wanted[name] - this.camera[name]);
   }
 
   toScreen([x, y]) {
     const { clientWidth, clientHeight } = this.canvas;
-    return [clientWidth / 2 + (x - this.centre) * this.scale, clientHeight / 2 - y * this.scale];
+    return [clientWidth / 2 + (x - this.camera.x) * this.scale, clientHeight / 2 - (y - this.camera.y) * this.scale];
   }
 
   toRig(px, py) {
     const { clientWidth, clientHeight } = this.canvas;
-    return [this.centre + (px - clientWidth / 2) / this.scale, (clientHeight / 2 - py) / this.scale];
+    return [this.camera.x + (px - clientWidth / 2) / this.scale, this.camera.y + (clientHeight / 2 - py) / this.scale];
   }
 
   // Nearest body to a point of the screen: its number, and where on it.
@@ -81,8 +100,11 @@ export class RigView {
       if (this.state === null) return;
       const near = this.nearest(event.offsetX, event.offsetY);
       if (near === null) {
-        const [x, y] = this.toRig(event.offsetX, event.offsetY);
-        if (Math.abs(y) < 0.15 * this.reach) this.act.moveTo(x);
+        this.isMoving = Math.abs(this.toRig(event.offsetX, event.offsetY)[1]) < 0.2 * this.reach;
+        if (this.isMoving) {
+          canvas.setPointerCapture(event.pointerId);
+          this.act.moveTo(this.toRig(event.offsetX, event.offsetY)[0]);
+        }
         return;
       }
       if (!this.hello.is_simulated) return;
@@ -92,6 +114,7 @@ export class RigView {
     });
     canvas.addEventListener('pointermove', (event) => {
       if (this.grip !== null) this.grip.at = [event.offsetX, event.offsetY];
+      else if (this.isMoving) this.act.moveTo(this.toRig(event.offsetX, event.offsetY)[0]);
     });
     for (const end of ['pointerup', 'pointercancel', 'lostpointercapture']) {
       canvas.addEventListener(end, () => this.release());
@@ -125,6 +148,7 @@ export class RigView {
   }
 
   release() {
+    this.isMoving = false;
     if (this.grip === null) return;
     this.grip = null;
     this.canvas.classList.remove('pulling');
@@ -149,56 +173,140 @@ export class RigView {
     }
   }
 
-  // Draws a state; `setpoint` (m) and `pull` may be null.
-  draw(state, setpoint, pull) {
+  // Draws a state; `setpoint` (m) and `pull` may be null. `shown` has what the firmware does: `isOn`, `isKnown`, `isUp`,
+  // `force_n`, and the state at which a fault turned the motor off, if there was one.
+  draw(state, setpoint, pull, shown) {
     this.state = state;
-    const { draw, width } = context(this.canvas);
     if (this.hello.lengths_m.length === 0) return;
-    // The view follows the cart, but not while the person pulls.
-    if (this.grip === null && this.keys.size === 0) this.centre += 0.12 * (state[0] - this.centre);
+    this.aim(state, shown.isUp);
+    const { draw, width } = context(this.canvas);
     const line = (points, style, thickness, dash = []) => {
       draw.strokeStyle = style;
       draw.lineWidth = thickness;
       draw.setLineDash(dash);
-      draw.lineCap = 'round';
+      draw.lineCap = dash.length > 0 ? 'butt' : 'round';
       draw.beginPath();
       points.forEach((point) => draw.lineTo(...this.toScreen(point)));
       draw.stroke();
       draw.setLineDash([]);
     };
-    const [low, high] = this.travel();
-    line([[low, 0], [high, 0]], colour('--rule'), 4);
-    for (const end of [low, high]) line([[end, -0.06 * this.reach], [end, 0.06 * this.reach]], colour('--ink'), 5);
-    for (const end of this.hello.soft_m) line([[end, -0.04 * this.reach], [end, 0.04 * this.reach]], colour('--limit'), 2, [4, 4]);
+    this.track(draw, line);
     this.ticks(draw, width);
-    if (setpoint !== null) {
-      line([[setpoint, -0.12 * this.reach], [setpoint, -0.05 * this.reach]], colour('--link'), 4);
-    }
-    this.machine(draw, line, state);
+    if (setpoint !== null) this.aimed(draw, line, setpoint);
+    this.follow(draw, state, shown.t_s);
+    if (shown.isUp) this.limits(line, state[0]);
+    if (shown.fallen !== null) this.outline(draw, line, shown.fallen, colour('--bad'), 'the motor went off here');
+    if (!shown.isKnown) this.outline(draw, line, [state[0], 0, ...state.slice(2).fill(0)], colour('--muted'), 'where it will stand');
+    this.machine(draw, line, state, shown.isOn);
+    if (!shown.isKnown) this.label(draw, joints(this.hello.lengths_m, state).at(-1), 'angle ?', colour('--ink'));
+    if (shown.isOn) this.push(draw, state, shown.force_n);
     if (pull !== null && pull !== undefined) this.spring(draw, line, state, pull);
-    this.drawRail(state, setpoint);
+    if (!this.rail.hidden) this.drawRail(state, setpoint);
+  }
+
+  label(draw, at, text, style) {
+    const [px, py] = this.toScreen(at);
+    draw.fillStyle = style;
+    draw.font = '600 14px system-ui, sans-serif';
+    draw.textAlign = 'left';
+    draw.fillText(text, Math.min(px + 12, this.canvas.clientWidth - draw.measureText(text).width - 6), Math.max(56, py - 4));
+  }
+
+  // The rail with its stops, and the zones in which the motor goes off.
+  track(draw, line) {
+    const [low, high] = this.travel();
+    line([[low, 0], [high, 0]], colour('--rule'), 6);
+    const [from, to] = this.hello.soft_m;
+    for (const zone of [[low, Math.max(low, from)], [Math.min(high, to), high]]) line(zone.map((x) => [x, 0]), colour('--bad'), 6, [2, 4]);
+    for (const end of [low, high]) line([[end, -0.05 * this.reach], [end, 0.08 * this.reach]], colour('--ink'), 6);
+  }
+
+  // The set-point as a ◆ below the rail, with its plumb line.
+  aimed(draw, line, x) {
+    const style = colour('--link');
+    line([[x, 0], [x, 1.1 * this.reach]], style, 1, [6, 6]);
+    const [px, py] = this.toScreen([x, 0]);
+    const y = py + 50;
+    draw.fillStyle = style;
+    draw.beginPath();
+    for (const [dx, dy] of [[0, -9], [9, 0], [0, 9], [-9, 0]]) draw.lineTo(px + dx, y + dy);
+    draw.fill();
+    draw.font = '600 13px system-ui, sans-serif';
+    const isRight = px < this.canvas.clientWidth - 140;
+    draw.textAlign = isRight ? 'left' : 'right';
+    draw.fillText(`set-point ${x.toFixed(2).replace('-', '−')} m`, px + (isRight ? 14 : -14), y + 5);
+  }
+
+  // Where the tip has been.
+  follow(draw, state, t) {
+    const { trail } = this;
+    if (trail.length > 0 && t < trail.at(-1).t) trail.length = 0;
+    if (trail.length === 0 || t > trail.at(-1).t) trail.push({ t, at: joints(this.hello.lengths_m, state).at(-1) });
+    while (trail.length > 0 && trail[0].t < t - TRAIL_S) trail.shift();
+    draw.strokeStyle = colour(`--c${(this.hello.lengths_m.length - 1) % 6}`);
+    draw.lineWidth = 2;
+    for (let k = 1; k < trail.length; k += 1) {
+      draw.globalAlpha = 0.5 * Math.max(0, 1 - (t - trail[k].t) / TRAIL_S);
+      draw.beginPath();
+      draw.moveTo(...this.toScreen(trail[k - 1].at));
+      draw.lineTo(...this.toScreen(trail[k].at));
+      draw.stroke();
+    }
+    draw.globalAlpha = 1;
+  }
+
+  // The lean at which the motor goes off.
+  limits(line, x) {
+    const angle = this.hello.angle_limit_rad;
+    if (!(angle < 1.5)) return;
+    for (const side of [-1, 1]) {
+      const at = (part) => [x + side * part * this.reach * Math.sin(angle), part * this.reach * Math.cos(angle)];
+      line([at(0.25), at(1.05)], colour('--limit'), 2, [2, 6]);
+    }
+  }
+
+  outline(draw, line, state, style, text) {
+    const points = joints(this.hello.lengths_m, state);
+    line(points, style, 2, [6, 4]);
+    this.label(draw, points.at(-1), text, style);
+  }
+
+  // The motor's force as an arrow beside the cart.
+  push(draw, state, force) {
+    if (!(Math.abs(force) > 1e-3)) return;
+    const [px, py] = this.toScreen([state[0], 0]);
+    const side = Math.sign(force);
+    const length = 10 + (50 * Math.min(1, Math.abs(force) / this.hello.force_limit_n));
+    const from = px + side * (0.5 * CART.width * this.reach * this.scale + 6);
+    draw.fillStyle = colour('--ink');
+    draw.fillRect(Math.min(from, from + side * length), py - 4, length, 8);
+    draw.beginPath();
+    for (const [dx, dy] of [[length, -10], [length + 16, 0], [length, 10]]) draw.lineTo(from + side * dx, py + dy);
+    draw.fill();
   }
 
   ticks(draw, width) {
+    const [low, high] = this.travel();
     const [left] = this.toRig(0, 0);
     const [right] = this.toRig(width, 0);
-    const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1].find((size) => size * this.scale > 70) ?? 1;
+    const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1].find((size) => size * this.scale > 52) ?? 1;
     draw.fillStyle = colour('--muted');
     draw.font = '12px system-ui, sans-serif';
     draw.textAlign = 'center';
-    for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
+    for (let x = Math.ceil(Math.max(low, left) / step) * step; x <= Math.min(high, right); x += step) {
       const [px, py] = this.toScreen([x, 0]);
-      draw.fillText(`${Number(x.toFixed(2))} m`, px, py + 0.22 * this.reach * this.scale);
+      draw.fillText(`${Number(x.toFixed(2))} m`.replace('-', '−'), px, py + 32);
     }
   }
 
-  machine(draw, line, state) {
+  machine(draw, line, state, isOn) {
     const points = joints(this.hello.lengths_m, state);
     const [px, py] = this.toScreen(points[0]);
     const [w, h] = [CART.width, CART.height].map((size) => size * this.reach * this.scale);
-    draw.fillStyle = colour('--reference');
+    // A cart whose motor is on is filled.
+    draw.fillStyle = colour(isOn ? '--live' : '--raised');
     draw.strokeStyle = colour('--ink');
-    draw.lineWidth = this.body === 0 ? 3 : 1;
+    draw.lineWidth = this.body === 0 ? 4 : 2;
     draw.fillRect(px - w / 2, py - h / 2, w, h);
     draw.strokeRect(px - w / 2, py - h / 2, w, h);
     for (let link = 1; link < points.length; link += 1) {
@@ -221,7 +329,7 @@ export class RigView {
     draw.font = '600 14px system-ui, sans-serif';
     draw.textAlign = 'left';
     const [px, py] = this.toScreen(pull.to);
-    draw.fillText(`${Math.hypot(...pull.force_n).toFixed(2)} N`, px + 10, py - 8);
+    draw.fillText(`you: ${newtons(Math.hypot(...pull.force_n))}`, px + 10, py - 8);
   }
 
   // The whole rail: click it to move the set-point.

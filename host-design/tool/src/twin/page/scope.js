@@ -1,29 +1,39 @@
 // Scopes: curves over the last seconds, with zoom, a cursor and a picture.
 
 import { colour, dash } from './colours.js';
+import { isEstimated, isHomed, isOn } from './guide.js';
 import { context } from './rig.js';
 
 const CAPACITY = 1 << 14; // telemetry messages that are kept
 const LONGEST_S = 60;
 const SHORTEST_S = 0.2;
 const DEGREES = 180 / Math.PI;
-const MARGIN = { left: 58, right: 6, top: 6, bottom: 18 };
+const MARGIN = { left: 52, right: 6, top: 6, bottom: 6 };
+const NARROW = matchMedia('(max-width: 50rem)');
+const AXIS_PX = 18;
 
-// The scopes: curves, each with its name and its value in a telemetry message, and the smallest range that is shown.
+// What is known at a time: the estimate, only the true position, or nothing.
+const [ESTIMATED, SEEN, UNKNOWN] = [0, 1, 2];
+
+// The scopes: curves, each with its name, its value in a telemetry message, and its limit, beside the smallest range
+// that is shown and what is said where there is no value.
 function panels(hello) {
   const joints = hello.sensors.map((name, sensor) => ({ name, sensor })).slice(1);
-  const each = (value) => joints.map(({ name, sensor }) => ({ name, value: (t) => value(t, sensor) }));
+  const each = (value) => joints.map(({ name, sensor }) => ({ name, value: (t) => value(t, sensor), ink: `--c${(sensor - 1) % 6}` }));
+  const estimate = (index, factor = 1) => (t) => (isEstimated(t) ? t.estimate[index] * factor : NaN);
+  const motor = (name) => (t) => (isOn(t) ? t[name] : NaN);
   return [
-    { title: 'position (m)', least: 0.01, curves: [
-      { name: 'cart', value: (t) => t.estimate[0] }, { name: 'set-point', value: (t) => t.setpoint_m }] },
-    { title: 'angles (°)', least: 0.5, curves: each((t, sensor) => t.estimate[2 * sensor] * DEGREES) },
-    { title: 'rates (°/s)', least: 10, curves: each((t, sensor) => t.estimate[2 * sensor + 1] * DEGREES) },
-    { title: 'force (N)', least: 0.2, curves: [
-      { name: 'requested', value: (t) => t.requested_n }, { name: 'applied', value: (t) => t.applied_n }] },
-    { title: 'innovation (mm, mrad)', least: 0.1, curves: hello.sensors.map((name, sensor) => (
-      { name, value: (t) => t.innovation[sensor] * 1e3 })) },
-    { title: 'tick (processor cycles)', least: 10, curves: [
-      { name: 'cycles', value: (t) => t.cycles }, { name: 'worst', value: (t) => t.worst_cycles }] },
+    { title: 'Angle', unit: '°', least: 0.5, without: 'no estimate', limits: [1, -1].map((side) => side * hello.angle_limit_rad * DEGREES),
+      curves: joints.map(({ name, sensor }) => ({ name, value: estimate(2 * sensor, DEGREES), seen: (state) => state[2 * sensor] * DEGREES, ink: `--c${(sensor - 1) % 6}` })) },
+    { title: 'Position', unit: 'm', least: 0.01, without: 'no estimate', limits: hello.soft_m, curves: [
+      { name: 'cart', value: estimate(0), seen: (state) => state[0], ink: '--ink' }, { name: 'set-point', value: (t) => t.setpoint_m, ink: '--link' }] },
+    { title: 'Force', unit: 'N', least: 0.2, without: 'motor off', limits: [hello.force_limit_n, -hello.force_limit_n], curves: [
+      { name: 'requested', value: motor('requested_n'), ink: '--c1' }, { name: 'applied', value: motor('applied_n'), ink: '--ink' }] },
+    { title: 'Rate', unit: '°/s', least: 10, without: 'no estimate', curves: each((t, sensor) => estimate(2 * sensor + 1, DEGREES)(t)) },
+    { title: 'Surprise', unit: 'mm, mrad', least: 0.1, without: 'no prediction', curves: hello.sensors.map((name, sensor) => (
+      { name, value: (t) => (isEstimated(t) ? t.innovation[sensor] * 1e3 : NaN), ink: sensor === 0 ? '--ink' : `--c${(sensor - 1) % 6}` })) },
+    { title: 'Tick', unit: 'processor cycles', least: 10, curves: [
+      { name: 'cycles', value: (t) => t.cycles, ink: '--ink' }, { name: 'worst', value: (t) => t.worst_cycles, ink: '--c1' }] },
   ].filter((panel) => panel.curves.length > 0);
 }
 
@@ -32,14 +42,21 @@ class History {
   constructor(curves) {
     this.times = new Float64Array(CAPACITY);
     this.values = curves.map(() => new Float32Array(CAPACITY));
+    this.seen = curves.map((curve) => (curve.seen === undefined ? null : new Float32Array(CAPACITY)));
+    this.known = new Uint8Array(CAPACITY);
     this.curves = curves;
     this.length = 0;
   }
 
-  push(t, telemetry) {
+  // `state` is the true one, or what the encoders say.
+  push(t, telemetry, state) {
     const slot = this.length % CAPACITY;
     this.times[slot] = t;
-    this.curves.forEach((curve, i) => { this.values[i][slot] = curve.value(telemetry) ?? NaN; });
+    this.known[slot] = isEstimated(telemetry) ? ESTIMATED : state !== null ? SEEN : UNKNOWN;
+    this.curves.forEach((curve, i) => {
+      this.values[i][slot] = curve.value(telemetry) ?? NaN;
+      if (curve.seen !== undefined) this.seen[i][slot] = this.known[slot] === SEEN ? curve.seen(state) : NaN;
+    });
     this.length += 1;
   }
 
@@ -61,8 +78,11 @@ class History {
 }
 
 export class Scopes {
-  constructor(place, hello) {
+  constructor(place, axis, hello) {
     this.hello = hello;
+    this.axis = axis;
+    this.events = [];
+    this.before = { state: null, pull: null };
     this.span = 10;
     this.isHeld = false;
     this.end = 0;
@@ -79,23 +99,25 @@ export class Scopes {
     }
   }
 
-  add(place, { title, least, curves }) {
+  add(place, panel) {
+    const { title, unit, curves } = panel;
     const element = document.createElement('div');
     element.className = 'panel';
     const legend = document.createElement('div');
     legend.className = 'legend';
     const name = document.createElement('b');
-    name.textContent = title;
+    name.textContent = `${title} `;
+    name.append(Object.assign(document.createElement('small'), { textContent: unit, className: 'note' }));
     legend.append(name);
     const values = curves.map((curve, i) => {
       const entry = document.createElement('span');
-      const style = `stroke: ${this.ink(i)}; stroke-width: 2; stroke-dasharray: ${dash(i).join(' ') || 'none'}`;
+      const style = `stroke: ${colour(curve.ink)}; stroke-width: 2; stroke-dasharray: ${dash(i).join(' ') || 'none'}`;
       const sample = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
       const stroke = document.createElementNS('http://www.w3.org/2000/svg', 'line');
       for (const [key, value] of Object.entries({ x1: 0, x2: 28, y1: 6, y2: 6 })) stroke.setAttribute(key, value);
       stroke.style.cssText = style;
       sample.append(stroke);
-      const value = document.createElement('span');
+      const value = document.createElement('i');
       entry.append(sample, ` ${curve.name} `, value);
       legend.append(entry);
       return value;
@@ -103,7 +125,10 @@ export class Scopes {
     const canvas = document.createElement('canvas');
     canvas.tabIndex = 0;
     canvas.setAttribute('aria-label', `${title}: arrow keys move the cursor, + and − zoom`);
-    element.append(legend, canvas);
+    const box = document.createElement('div');
+    box.className = 'canvas';
+    box.append(canvas);
+    element.append(legend, box);
     place.append(element);
     const at = (event) => this.end - this.span + (this.span * (event.offsetX - MARGIN.left)) / (canvas.clientWidth - MARGIN.left - MARGIN.right);
     canvas.addEventListener('pointermove', (event) => { this.cursor = at(event); });
@@ -119,15 +144,48 @@ export class Scopes {
       if (event.key === '+') this.zoom(0.8);
       if (event.key === '-') this.zoom(1.25);
     });
-    return { title, least, curves, canvas, values };
+    // A scope that has nothing to say is not there; the first two are, to say so.
+    element.hidden = panel.limits === undefined || title === 'Force';
+    return { ...panel, canvas, values, element };
   }
 
-  ink(number) { return colour(`--c${number % 6}`); }
-
-  push(telemetry) {
+  push(telemetry, machine) {
     const t = telemetry.tick * this.hello.tick_s;
-    if (t < this.history.last) this.history.length = 0; // the firmware has started again
-    this.history.push(t, telemetry);
+    if (t < this.history.last) { // the firmware has started again
+      this.history.length = 0;
+      this.events.length = 0;
+    }
+    const isKnown = isHomed(telemetry) || telemetry.state === 'Fault';
+    const state = isKnown ? machine?.state ?? (isHomed(telemetry) ? this.measured(telemetry) : null) : null;
+    this.history.push(t, telemetry, state);
+    for (const panel of this.panels) {
+      if (panel.element.hidden) panel.element.hidden = !panel.curves.some(({ value }) => Math.abs(value(telemetry)) > 0);
+    }
+    this.note(t, telemetry, machine?.pull ?? null);
+  }
+
+  // Events on the time axis: pulls with their largest force, and faults.
+  note(t, telemetry, pull) {
+    const { before, events } = this;
+    if (telemetry.state === 'Fault' && before.state !== 'Fault' && before.state !== null) events.push({ t, text: '× off', style: '--bad' });
+    if (pull !== null && before.pull === null && telemetry.state !== 'Fault') events.push({ t, text: '', style: '--ink', force_n: 0 });
+    if (pull !== null && telemetry.state !== 'Fault') {
+      const event = events.findLast(({ force_n: force }) => force !== undefined);
+      const force = Math.hypot(...pull.force_n);
+      if (event !== undefined && force > event.force_n) Object.assign(event, { force_n: force, text: `▸ ${force.toFixed(2)} N` });
+    }
+    Object.assign(before, { state: telemetry.state, pull });
+    while (events.length > 0 && events[0].t < t - LONGEST_S) events.shift();
+  }
+
+  // The state as far as the firmware knows it: its estimate, else the encoders' positions, else hanging.
+  measured(telemetry) {
+    if (isEstimated(telemetry)) return telemetry.estimate;
+    const state = new Array(telemetry.estimate.length).fill(0);
+    const { step } = this.hello;
+    if (isHomed(telemetry) && step !== null) step.forEach((size, sensor) => { state[2 * sensor] = size * telemetry.counts[sensor]; });
+    else if (state.length > 2) state[2] = Math.PI;
+    return state;
   }
 
   zoom(factor) { this.span = Math.min(LONGEST_S, Math.max(SHORTEST_S, this.span * factor)); }
@@ -138,18 +196,21 @@ export class Scopes {
     this.back = 0;
   }
 
-  // Draws one panel per call, in turn, so that every frame takes equally long.
+  // Draws one panel per call, in turn, so that every frame takes equally long; after the last one the time axis.
   drawNext() {
     this.end = (this.isHeld ? this.heldAt : this.history.last) + this.back;
-    this.drawn = (this.drawn + 1) % this.panels.length;
-    this.drawPanel(this.panels[this.drawn]);
+    const shown = this.panels.filter(({ element, canvas }) => !element.hidden && canvas.clientHeight > 0);
+    this.drawn = this.drawn < shown.length ? this.drawn + 1 : 0;
+    if (this.drawn < shown.length) this.drawPanel(shown[this.drawn]);
+    else if (this.axis.clientHeight > 0) this.drawAxis();
   }
 
-  drawPanel(panel) {
-    const { draw, width, height } = context(panel.canvas);
+  x(width) {
     const begin = this.end - this.span;
-    const [from, to] = [this.history.after(begin), this.history.after(this.end + 1e-9)];
-    const rows = panel.curves.map((_, i) => this.history.values[panel.offset + i]);
+    return (t) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * (t - begin)) / this.span;
+  }
+
+  range({ least }, rows, from, to) {
     let [low, high] = [Infinity, -Infinity];
     for (const row of rows) {
       for (let k = from; k < to; k += 1) {
@@ -159,21 +220,69 @@ export class Scopes {
       }
     }
     if (low > high) [low, high] = [0, 0];
-    const room = Math.max(0.08 * (high - low), 0.5 * (panel.least - (high - low)));
-    [low, high] = [low - room, high + room];
-    const x = (t) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * (t - begin)) / this.span;
-    const y = (value) => MARGIN.top + ((height - MARGIN.top - MARGIN.bottom) * (high - value)) / (high - low);
-    this.axes(draw, { x, y, low, high, begin, width, height });
-    rows.forEach((row, i) => {
-      draw.strokeStyle = this.ink(i);
-      draw.setLineDash(dash(i));
-      draw.lineWidth = 1.6;
+    const room = Math.max(0.08 * (high - low), 0.5 * (least - (high - low)));
+    return [low - room, high + room];
+  }
+
+  drawPanel(panel) {
+    const { draw, width, height } = context(panel.canvas);
+    const { history } = this;
+    const [from, to] = [history.after(this.end - this.span), history.after(this.end + 1e-9)];
+    const of = (rows) => panel.curves.map((_, i) => rows[panel.offset + i]);
+    const [rows, seen] = [of(history.values), of(history.seen)];
+    const [low, high] = this.range(panel, [...rows, ...seen.filter((row) => row !== null)], from, to);
+    const bottom = MARGIN.bottom + (NARROW.matches ? AXIS_PX : 0);
+    const x = this.x(width);
+    const y = (value) => MARGIN.top + ((height - MARGIN.top - bottom) * (high - value)) / (high - low);
+    this.gone(draw, panel, { x, from, to, height });
+    this.levels(draw, panel, { y, low, high, width });
+    if (NARROW.matches) this.seconds(draw, x, height - 4);
+    const curve = (row, i, thickness, pattern) => {
+      draw.strokeStyle = colour(panel.curves[i].ink);
+      draw.lineWidth = thickness;
+      draw.setLineDash(pattern);
       draw.beginPath();
-      for (let k = from; k < to; k += 1) draw.lineTo(x(this.history.time(k)), y(row[k % CAPACITY]));
+      let isDown = false;
+      for (let k = from; k < to; k += 1) {
+        const value = row[k % CAPACITY];
+        if (Number.isNaN(value)) isDown = false;
+        else if (isDown) draw.lineTo(x(history.time(k)), y(value));
+        else draw.moveTo(x(history.time(k)), y(value));
+        isDown = !Number.isNaN(value);
+      }
       draw.stroke();
-    });
+    };
+    seen.forEach((row, i) => { if (row !== null) curve(row, i, 1.6, [2, 3]); });
+    rows.forEach((row, i) => curve(row, i, 1.6, dash(i)));
     draw.setLineDash([]);
-    const index = this.cursor === null ? this.history.length - 1 : this.history.after(this.cursor);
+    this.readout(draw, panel, { x, rows, seen, height });
+  }
+
+  // Where there is no estimate, and why.
+  gone(draw, { without }, { x, from, to, height }) {
+    if (without === undefined) return;
+    const { history } = this;
+    const isGone = (k) => history.known[k % CAPACITY] !== ESTIMATED;
+    for (let k = from; k < to; k += 1) {
+      if (!isGone(k)) continue;
+      const begin = k;
+      while (k + 1 < to && isGone(k + 1)) k += 1;
+      const [left, right] = [x(history.time(begin)), x(history.time(k))];
+      draw.fillStyle = colour('--rule');
+      draw.globalAlpha = 0.35;
+      draw.fillRect(left, 0, right - left, height);
+      draw.globalAlpha = 1;
+      if (right - left < 90) continue;
+      draw.fillStyle = colour('--muted');
+      draw.font = '12px system-ui, sans-serif';
+      draw.textAlign = 'right';
+      draw.fillText(history.known[k % CAPACITY] === UNKNOWN ? 'unknown until homed' : without, right - 6, 16);
+    }
+  }
+
+  readout(draw, panel, { x, rows, seen, height }) {
+    const { history } = this;
+    const index = this.cursor === null ? history.length - 1 : history.after(this.cursor);
     if (this.cursor !== null) {
       draw.strokeStyle = colour('--cursor');
       draw.beginPath();
@@ -181,36 +290,70 @@ export class Scopes {
       draw.lineTo(x(this.cursor), height);
       draw.stroke();
     }
-    const isThere = index >= this.history.first && index < this.history.length;
+    const isThere = index >= history.first && index < history.length;
+    const read = (row) => (row === null || !isThere ? NaN : row[index % CAPACITY]);
     panel.values.forEach((place, i) => {
-      place.textContent = isThere ? Number(rows[i][index % CAPACITY].toPrecision(4)).toString() : '–';
+      const [value, true_] = [read(rows[i]), read(seen[i])];
+      const text = Number.isFinite(value) ? short(value) : Number.isFinite(true_) ? `(${short(true_)})` : '—';
+      if (place.textContent !== text) place.textContent = text;
     });
   }
 
-  axes(draw, { x, y, low, high, begin, width, height }) {
+  // Lines at round values, and limits that are within the range.
+  levels(draw, { limits = [] }, { y, low, high, width }) {
+    const across = (value) => {
+      draw.beginPath();
+      draw.moveTo(MARGIN.left, y(value));
+      draw.lineTo(width - MARGIN.right, y(value));
+      draw.stroke();
+    };
     draw.strokeStyle = colour('--rule');
     draw.fillStyle = colour('--muted');
     draw.font = '12px system-ui, sans-serif';
     draw.lineWidth = 1;
     draw.textAlign = 'right';
-    const step = niceStep((high - low) / 4);
+    const step = niceStep((high - low) / 3);
     for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
-      draw.beginPath();
-      draw.moveTo(MARGIN.left, y(value));
-      draw.lineTo(width - MARGIN.right, y(value));
-      draw.stroke();
-      draw.fillText(Number(value.toPrecision(3)).toString(), MARGIN.left - 6, y(value) + 4);
+      across(value);
+      draw.fillText(short(value), MARGIN.left - 6, y(value) + 4);
     }
+    draw.strokeStyle = colour('--bad');
+    draw.setLineDash([2, 4]);
+    for (const limit of limits) if (limit > low && limit < high) across(limit);
+    draw.setLineDash([]);
+  }
+
+  seconds(draw, x, y) {
+    draw.fillStyle = colour('--muted');
+    draw.font = '12px system-ui, sans-serif';
     draw.textAlign = 'center';
-    const seconds = niceStep(this.span / 5);
-    for (let t = Math.ceil(Math.max(0, begin) / seconds) * seconds; t <= this.end; t += seconds) {
-      draw.fillText(`${Number(t.toFixed(2))} s`, Math.min(x(t), width - 24), height - 4);
+    const step = niceStep(this.span / 5);
+    for (let t = Math.ceil(Math.max(0, this.end - this.span) / step) * step; t <= this.end; t += step) {
+      if (x(t) < this.axis.clientWidth - 16 || NARROW.matches) draw.fillText(`${Number(t.toFixed(2))} s`, x(t), y);
+    }
+  }
+
+  // The time axis of all scopes, with what happened.
+  drawAxis() {
+    const { draw, width } = context(this.axis);
+    const x = this.x(width);
+    this.seconds(draw, x, 13);
+    draw.font = '600 12px system-ui, sans-serif';
+    let free = 0;
+    for (const { t, text, style } of this.events) {
+      if (t < this.end - this.span || t > this.end || text === '') continue;
+      const at = Math.max(free, Math.min(x(t), width - 50));
+      draw.fillStyle = colour(style);
+      draw.textAlign = 'left';
+      draw.fillText(text, at, 32);
+      free = at + draw.measureText(text).width + 8;
     }
   }
 
   // All scopes, one below the other, as the data URL of a PNG.
   picture() {
-    const sizes = this.panels.map(({ canvas }) => [canvas.width, canvas.height]);
+    const shown = this.panels.filter(({ element }) => !element.hidden);
+    const sizes = shown.map(({ canvas }) => [canvas.width, canvas.height]);
     const sheet = document.createElement('canvas');
     const head = 24 * (window.devicePixelRatio || 1);
     sheet.width = Math.max(...sizes.map(([width]) => width));
@@ -221,8 +364,8 @@ export class Scopes {
     draw.fillStyle = colour('--ink');
     draw.font = `${0.6 * head}px system-ui, sans-serif`;
     let top = 0;
-    for (const panel of this.panels) {
-      draw.fillText(`${panel.title}: ${panel.curves.map((curve) => curve.name).join(', ')}`, 8, top + 0.75 * head);
+    for (const panel of shown) {
+      draw.fillText(`${panel.title} (${panel.unit}): ${panel.curves.map((curve) => curve.name).join(', ')}`, 8, top + 0.75 * head);
       draw.drawImage(panel.canvas, 0, top + head);
       top += head + panel.canvas.height;
     }
@@ -235,3 +378,5 @@ function niceStep(size) {
   const power = 10 ** Math.floor(Math.log10(size));
   return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= size);
 }
+
+const short = (value) => Number(value.toPrecision(3)).toString().replace('-', '−');

@@ -1,0 +1,155 @@
+// What the rig waits for, in one line, and the one act that goes on from there.
+
+export const STEPS = ['Home', 'Check signs', 'Jog', 'Raise', 'Balance'];
+
+const AGAIN_MS = 400;
+const LAPSES_MS = 60e3;
+// A pull this long before a fault is named as its cause (s).
+const RECENT_S = 1.5;
+
+const say = (line) => ({ ask: 'say', line });
+const machine = (what) => ({ ask: 'machine', what });
+const hand = (how) => machine({ do: 'hold', how });
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+const begins = (list, text) => list.some((entry) => entry.startsWith(text));
+const reason = (text) => capital(text.replace(/^a link is not upright: /, ''));
+
+// Whether the firmware estimates the state, whether the motor may push, and whether it knows the positions.
+export const isEstimated = ({ state }) => ['Raising', 'Balancing', 'Holding', 'Lowering'].includes(state);
+export const isOn = (told) => isEstimated(told) || ['Jogging', 'Identifying'].includes(told.state);
+export const isHomed = ({ state, against_arming: against }) => (
+  state !== 'Disarmed' && state !== 'Homing' && !begins(against, 'positions are not known'));
+
+// What a person has asked for that is not possible yet: it is carried out as soon as it is, and Stop cancels it.
+export class Wish {
+  constructor(ask) {
+    Object.assign(this, { ask, name: null, since: 0, asked: 0 });
+  }
+
+  set(name, isSimulated) {
+    Object.assign(this, { name, since: performance.now(), asked: 0 });
+    if (isSimulated) this.ask(hand(name === 'up' ? 'free' : 'upright'));
+  }
+
+  cancel() { this.name = null; }
+
+  take(latest) {
+    const now = performance.now();
+    if (this.name === null || now - this.asked < AGAIN_MS) return;
+    if (latest.state === 'Balancing' && this.name === 'arm') this.ask(hand('free'));
+    if (latest.state === 'Fault' || isEstimated(latest) || now - this.since > LAPSES_MS) return this.cancel();
+    const against = this.name === 'up' ? latest.against_swing_up : latest.against_arming;
+    if (latest.state !== 'Calibrated' || against.length > 0) return;
+    this.asked = now;
+    this.ask(say(this.name));
+  }
+}
+
+// Remembers the strongest pull of the last moments, and at a fault keeps what there was.
+export class Witness {
+  constructor() {
+    Object.assign(this, { pulls: [], fall: null });
+  }
+
+  see(picture, latest) {
+    const { machine: told } = picture;
+    if (latest.state !== 'Fault') this.fall = null;
+    else if (this.fall === null) {
+      const strongest = this.pulls.reduce((best, pull) => (pull.n > (best?.n ?? 0.02) ? pull : best), null);
+      this.fall = { pull: strongest, defect: told?.defect ?? null, state: told?.state ?? latest.estimate };
+    }
+    if (told?.t_s === undefined || latest.state === 'Fault') return;
+    const isNew = this.pulls.length > 0 && told.t_s < this.pulls.at(-1).t;
+    this.pulls = isNew ? [] : this.pulls.filter(({ t }) => t > told.t_s - RECENT_S);
+    if (told.pull !== null) this.pulls.push({ t: told.t_s, n: Math.hypot(...told.pull.force_n), body: told.pull.body });
+  }
+}
+
+export const newtons = (n) => `${n.toFixed(n < 1 ? 2 : 1)} N`;
+export const bodyName = (body) => (body === 0 ? 'the cart' : `link ${body}`);
+
+const raise = { text: 'Raise', key: 'w', wish: 'up' };
+const lift = (hello) => (hello.is_simulated ? { text: 'Lift by hand', key: 'u', wish: 'arm' }
+  : { text: 'Arm', key: 'a', asks: [say('arm')] });
+
+function calibrated({ hello, latest, machine: told, wish }) {
+  const { against_arming: against, against_swing_up: swing, now } = latest;
+  if (begins(against, "the encoders' signs")) {
+    if (now === null) {
+      return { step: 1, line: 'Homed: hanging is now 180°', below: 'Next, see that each encoder counts the right way.',
+        act: { text: 'Check signs', key: 'g', asks: [say('check-signs'), ...(hello.is_simulated ? [hand('guided')] : [])] } };
+    }
+    if (!hello.is_simulated) return { step: 1, line: capital(now), below: 'With your hand; the motor is off.' };
+    return { step: 1, line: capital(now), below: 'The simulated hand does it.',
+      act: told?.holding === 'guided' ? undefined : { text: 'Let the hand do it', key: 'k', asks: [hand('guided')] } };
+  }
+  if (begins(against, "the motor's sign")) {
+    return { step: 2, line: 'The encoders count the right way', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' },
+      below: now === null ? 'Hands off: while you hold the button, the motor pushes the cart by some mm, to learn its own sense.' : capital(now) };
+  }
+  if (wish === 'up') return { step: 3, line: 'Will be raised as soon as it can be', below: `${reason(swing[0] ?? 'now')}. Stop cancels it.` };
+  if (wish === 'arm') return { step: 3, line: 'The hand lifts it', below: `${reason(against[0] ?? 'now')}.` };
+  if (!hello.has_swing_up) {
+    return { step: 3, line: 'Ready', act: lift(hello),
+      below: hello.is_simulated ? 'The simulated hand lifts it, and lets go when it balances.' : reason(against[0] ?? 'hold it upright, and arm') };
+  }
+  if (swing.length === 0) return { step: 3, line: 'Ready', below: 'Hands off: the motor swings it up.', act: raise };
+  const isSwinging = begins(swing, 'the links do not hang') || begins(swing, 'something moves');
+  return { step: 3, line: 'Hanging, motor off', below: isSwinging ? 'It still swings.' : `${reason(swing[0])}.`,
+    act: { ...raise, text: isSwinging ? 'Raise when still' : 'Raise when possible' } };
+}
+
+function balancing({ hello, machine: told }) {
+  if (told?.pull) return { step: 4, line: `You pull ${bodyName(told.pull.body)} with ${newtons(Math.hypot(...told.pull.force_n))}`, below: 'Let go, and watch it come back.' };
+  if (told?.holding === 'upright') return { step: 4, line: 'Balancing, and the hand still holds it', below: '', act: { text: 'Let go', key: 'f', asks: [hand('free')] } };
+  return { step: 4, line: 'Balancing', isDone: true,
+    below: hello.is_simulated ? 'Pull it, drag the ◆ on the rail, or break something.' : 'Move the set-point, or push it gently.',
+    act: hello.has_swing_up ? { text: 'Lower', key: 's', asks: [say('down')] } : undefined };
+}
+
+function fallen({ hello, picture, fall, step }) {
+  const { fault } = picture;
+  const name = fault === null ? 'a fault' : fault.name + (fault.at === null ? '' : ` (${fault.at})`);
+  const line = fall?.defect ? `Broken on purpose: the firmware turned the motor off: ${name}`
+    : fall?.pull ? `It fell: a pull of ${newtons(fall.pull.n)} was too strong` : `The motor is off: ${name}`;
+  const below = hello.is_simulated ? 'One click puts everything back (in a simulation only).' : capital(fault?.remedy ?? '');
+  const act = hello.is_simulated ? { text: 'Put it back up', key: 'b', asks: [machine({ do: 'restart', upright: true })] }
+    : { text: 'Clear the fault', key: 'c', asks: [say('clear')] };
+  return { step, line, below, act, isLost: true };
+}
+
+const BY_STATE = {
+  Disarmed: ({ hello }) => ({ step: 0, line: 'It does not know its angles yet', below: 'Let it hang still, then home: hanging is then 180°.',
+    act: { text: 'Home', key: 'h', asks: [...(hello.is_simulated ? [hand('hanging')] : []), say('home')] } }),
+  Homing: ({ latest }) => ({ step: 0, line: 'Homing', below: capital(latest.now ?? '') }),
+  Calibrated: calibrated,
+  Jogging: () => ({ step: 2, line: 'The motor pushes the cart', below: 'Hold the button until it has learnt its sense.', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' } }),
+  Identifying: () => ({ step: 2, line: 'The motor shakes the links' }),
+  Armed: ({ hello, latest, machine: told, wish }) => ({ step: 3, line: 'Armed: waits until all links are upright and still', below: reason(latest.against_arming[0] ?? ''),
+    act: hello.is_simulated && wish !== 'arm' && told?.holding !== 'upright' ? lift(hello) : undefined }),
+  Raising: () => ({ step: 3, line: 'The motor swings it up', below: 'Hands off until it stands.' }),
+  Balancing: balancing,
+  Holding: () => ({ step: 4, line: 'Holding where some links hang', act: { ...raise, asks: [say('up')], wish: undefined } }),
+  Lowering: () => ({ step: 4, line: 'The motor lowers it', below: 'Hands off until it hangs.' }),
+  Fault: fallen,
+};
+
+// `now`: hello, picture, the latest telemetry, the name of the wish, the fall, the step before, and whether this page
+// is in command. The answer: `step`, `line`, `below`, and the `act`, if there is one.
+export function guide(now) {
+  const { picture, latest } = now;
+  const { machine: told } = picture;
+  if (picture.ended !== null) return { step: now.step, line: capital(picture.ended), below: '' };
+  if (told?.stopped !== undefined) {
+    return { step: now.step, line: 'The firmware has stopped', below: told.stopped,
+      act: { text: 'Switch off and on', key: 'b', asks: [machine({ do: 'restart', upright: true })] } };
+  }
+  if (latest === null) return { step: 0, line: 'connecting …', below: '' };
+  const shown = BY_STATE[latest.state]({ ...now, machine: told });
+  if (!now.isCommander) {
+    return { ...shown, below: picture.commander === null ? 'Nobody is in command.' : 'Another page is in command. Stop works here, too.',
+      act: picture.commander === null ? { text: 'Take command', asks: [{ ask: 'command' }] } : undefined };
+  }
+  if (told?.paused) return { ...shown, below: `Time stands still at ${told.t_s.toFixed(3)} s.`, act: { text: 'Go on', key: 'p', asks: [machine({ do: 'pause', on: false })] } };
+  return shown;
+}
