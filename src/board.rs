@@ -46,7 +46,8 @@ use crate::control::encoder::CounterWidth;
 /// All inputs, read at the start of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs<const NY: usize> {
-    /// Raw readings of the encoder counters.
+    /// Raw readings of the encoder counters. With a drive that takes pulses, the first one is the number of all pulses
+    /// given so far.
     pub raw_counts: [u32; NY],
     /// Supply voltage of the motor's power stage (V).
     pub supply_v: f32,
@@ -79,7 +80,8 @@ pub struct Contacts {
 pub struct Output {
     /// Whether the power stage is enabled; false lets the motor coast.
     pub enable: bool,
-    /// Duty cycle from -1 to 1, positive along +x; 0 whenever `enable` is false. It is all that a board needs.
+    /// Duty cycle from -1 to 1, positive along +x; 0 whenever `enable` is false. It is all that a board needs, unless
+    /// its drive takes [`pulses`](Self::pulses).
     pub duty: f32,
     /// The same as the control law has computed it, for simulations; [`Drive::OFF`] whenever `enable` is false.
     pub drive: Drive,
@@ -88,6 +90,12 @@ pub struct Output {
 impl Output {
     /// Motor off.
     pub const OFF: Self = Self { enable: false, duty: 0.0, drive: Drive::OFF };
+
+    /// Pulses of this tick, positive along +x, to be spread evenly over it, the first one half an interval after its
+    /// beginning; 0 for a drive without pulses.
+    pub fn pulses(&self) -> i32 {
+        if let Drive::Steps(pulses) = self.drive { pulses } else { 0 }
+    }
 
     /// Motor on. `force_limit_n` is the largest force of the gain table (N): see [`Drive::duty`].
     #[inline(always)]
@@ -101,6 +109,9 @@ impl Output {
 pub trait Board<const NY: usize> {
     /// Widths of the encoder counters.
     const WIDTHS: [CounterWidth; NY];
+    /// Whether the board gives the pulses of [`Output::pulses`]. If it does not and the gain table's drive needs them,
+    /// the motor stays off.
+    const GIVES_PULSES: bool = false;
 
     /// The tick to which the timer is set that starts the control task (s). If the gain table is for another one,
     /// the motor stays off.
@@ -109,7 +120,8 @@ pub trait Board<const NY: usize> {
     /// Reads all inputs without waiting.
     fn inputs(&mut self) -> Inputs<NY>;
 
-    /// Drives the motor with the duty of `output` until the next call.
+    /// Drives the motor with the duty of `output` until the next call, or gives its pulses, once. A drive with pulses
+    /// that is enabled without pulses holds the cart.
     fn drive(&mut self, output: &Output);
 
     /// Called at the end of a tick. Restarts the independent watchdog, but not if this is the third tick in a row that

@@ -76,6 +76,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     pub(super) fn start_controller(&mut self, counts: &[i32; NY]) -> bool {
         self.controller.encoders_mut().home(&self.raw_counts, counts);
         let started = self.controller.start(&self.raw_counts).is_ok();
+        self.is_controlled = true;
         self.restart_supervision();
         started
     }

@@ -47,6 +47,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
                 self.calibration.cancel();
                 self.setpoint_commanded = false;
                 self.controller.stop();
+                self.let_go();
                 Answer::Done
             }
             Request::Clear => {
@@ -89,7 +90,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// Starts homing by the limit switches.
     fn home_rail(&mut self) -> Result<(), Inhibits> {
         let [travel, _] = self.table.limits.travel_counts;
-        Inhibits::NO_SWITCHES.when(travel == 0).err_if_any()?;
+        Inhibits::NO_SWITCHES.when(travel == 0).union(self.homing_inhibits()).err_if_any()?;
         self.supervisor.start_homing()?;
         self.calibration.start_rail_homing();
         Ok(())

@@ -26,16 +26,17 @@ pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize, S = NoSwingU
 impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
     ControlTask<'q, 't, B, NX, NY, S>
 {
-    /// The task before its first tick. If the board's timer is set to another tick than the gain table is for, the
-    /// motor stays off: [`Fault::Table`](crate::supervision::fault::Fault::Table). `commands` and `messages` lead from
-    /// and to the serial link.
+    /// The task before its first tick. If the board's timer is set to another tick than the gain table is for, or the
+    /// table's drive needs pulses that the board does not give, the motor stays off:
+    /// [`Fault::Table`](crate::supervision::fault::Fault::Table). `commands` and `messages` lead from and to the serial
+    /// link.
     pub fn new(
         mut firmware: Firmware<'t, NX, NY, S>,
         board: B,
         commands: Consumer<'q, Command>,
         messages: Producer<'q, Message<NX, NY>>,
     ) -> Self {
-        firmware.compare_tick(board.tick_s());
+        firmware.compare_board(board.tick_s(), B::GIVES_PULSES);
         Self { firmware, board, commands, messages, cycles: 0 }
     }
 

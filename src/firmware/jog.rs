@@ -5,7 +5,6 @@ use crate::board::{Inputs, Output};
 use crate::control::actuator::Drive;
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
-use crate::supervision::jog::cart;
 use crate::supervision::supervisor::State;
 use crate::table::SwingUp;
 
@@ -27,16 +26,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(Inhibits::HELD.when(!is_released))
             .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.limits)))
             .union(self.off_centre_inhibit(counts));
-        let cart_counts = cart(counts);
+        let answer = self.answer_to_jog(counts);
         self.supervisor.start_jogging(inhibits)?;
         self.debounce.start();
-        self.jog.begin(along, cart_counts);
+        self.jog.begin(along, answer);
         Ok(())
-    }
-
-    /// How far the cart has to move in the sign check (counts); 0 without a cart.
-    pub(super) fn cart_sign_counts(&self) -> i32 {
-        cart(&self.table.limits.sign_counts)
     }
 
     /// A tick of the jog.
@@ -48,14 +42,20 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
             return self.trip(fault, None);
         }
-        match self.jog.update(cart(&counts), self.cart_sign_counts(), table.tick_s) {
-            Some(share) => {
-                let force_n = share * table.limits.jog_force_n;
-                (self.requested_n, self.applied_n) = (force_n, force_n);
-                let drive = Drive::at_rest(force_n, table.motor.as_ref());
-                self.output = Output::on(drive, table.force_limit_n);
-            }
+        let answer = self.answer_to_jog(&counts);
+        match self.jog.update(answer, self.jog_sign_counts(), table.tick_s) {
+            Some(share) => self.output = self.jog_output(share),
             None => self.supervisor.disarm(),
         }
+    }
+
+    fn jog_output(&mut self, share: f32) -> Output {
+        if let Some(steps) = &self.table.steps {
+            return self.jog_drive(share, steps);
+        }
+        let force_n = share * self.table.limits.jog_force_n;
+        (self.requested_n, self.applied_n) = (force_n, force_n);
+        let drive = Drive::at_rest(force_n, self.table.motor.as_ref());
+        Output::on(drive, self.table.force_limit_n)
     }
 }

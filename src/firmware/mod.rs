@@ -27,6 +27,7 @@ mod commands;
 pub mod control_task;
 #[cfg(feature = "image")]
 pub mod hot_path;
+mod idle_drive;
 mod jog;
 mod posture;
 mod shake;
@@ -45,8 +46,10 @@ use crate::supervision::calibration::Calibration;
 use crate::supervision::debounce::Debounce;
 use crate::supervision::detection::Detection;
 use crate::supervision::fault::{Cause, Fault};
-use crate::supervision::jog::{Jog, MotorSign, cart};
+use crate::supervision::homing::WrongTravel;
+use crate::supervision::jog::{Jog, MotorSign};
 use crate::supervision::shaking::Shaker;
+use crate::supervision::slow_drive::SlowDrive;
 use crate::supervision::supervisor::{State, Supervisor};
 use crate::table::{ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp};
 
@@ -99,6 +102,10 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     /// The tick of the board's timer (s).
     timer_tick_s: f32,
     shaker: Shaker<NY>,
+    /// A drive with pulses, while no control law commands it.
+    slow_drive: SlowDrive,
+    /// Whether a control law has commanded it since.
+    is_controlled: bool,
     /// Motor voltage of the previous tick, while the rig is shaken (V).
     last_volts: f32,
     /// Logged ticks that are not yet sent; `None` while no log is kept.
@@ -116,9 +123,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// The firmware, motor off. `start` is what the board knows about its start: a [`Start`], or just a
     /// [`Reset`](crate::protocol::message::Reset). Without swing-up, `swing_up` is [`NoSwingUp`].
     ///
-    /// There is a firmware for every table: if one is damaged, or its drive imposes the cart's acceleration,
-    /// [`Fault::Table`] is latched, cannot be cleared, and is reported to the host. To know before, call
-    /// [`GainTable::check`] and [`SwingUp::check`].
+    /// There is a firmware for every table: if one is damaged, [`Fault::Table`] is latched, cannot be cleared, and is
+    /// reported to the host. To know before, call [`GainTable::check`] and [`SwingUp::check`].
     // Returns no `Result`, which would put a copy of the firmware on the stack.
     #[inline(never)]
     pub fn new(
@@ -128,9 +134,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         start: impl Into<Start>,
     ) -> Self {
         let start = start.into();
-        // Homing, sign checks and jog of the whole firmware are for forces only.
-        let is_served = table.steps.is_none();
-        let are_sound = is_served && swing_up.check(table).is_ok() && table.check().is_ok();
+        let are_sound = swing_up.check(table).is_ok() && table.check().is_ok();
         let (controller, is_usable) = match Controller::with_checked(table, widths) {
             Ok(controller) if are_sound => (controller, true),
             _ => (Controller::unusable(table, widths), false),
@@ -146,8 +150,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             controller,
             supervisor,
             calibration: Calibration::new(&table.limits),
-            jog: Jog::new(cart(&table.limits.sign_counts)),
-            detection: Detection::default(),
+            jog: Jog::new(table.limits.sign_counts.get(table.motor_sensor()).copied().unwrap_or_default()),
+            detection: Detection::of_motor(table.motor_sensor()),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
             swing_up_scan: ChecksumScan::default(),
@@ -175,16 +179,20 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             ticks_to_telemetry: 0,
             timer_tick_s: table.tick_s,
             shaker: Shaker::default(),
+            slow_drive: SlowDrive::default(),
+            is_controlled: false,
             last_volts: 0.0,
             log: None,
         }
     }
 
-    /// Takes the tick of the board's timer (s). If it is not the table's, [`Fault::Table`] is latched, cannot be
-    /// cleared, and [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
-    pub(crate) fn compare_tick(&mut self, timer_tick_s: f32) {
+    /// Takes the tick of the board's timer (s), and whether the board gives pulses. If the tick is not the table's, or
+    /// pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
+    /// [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
+    pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool) {
         let difference = f32::abs(timer_tick_s - self.table.tick_s);
-        if difference.is_nan() || difference > TICK_TOLERANCE * self.table.tick_s {
+        let lacks_pulses = self.table.steps.is_some() && !gives_pulses;
+        if lacks_pulses || difference.is_nan() || difference > TICK_TOLERANCE * self.table.tick_s {
             (self.timer_tick_s, self.is_usable) = (timer_tick_s, false);
             self.trip(Fault::Table, None);
         }
@@ -263,6 +271,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         if !self.output.enable {
             (self.requested_n, self.applied_n) = (0.0, 0.0);
             self.controller.stop();
+            if let Some(steps) = &self.table.steps {
+                self.output = self.idle(steps);
+            }
         }
         &self.output
     }
@@ -288,11 +299,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.jog.wait();
         self.rearm_lockout_ticks = self.rearm_lockout_ticks.saturating_sub(1);
         match self.supervisor.state() {
-            State::Homing => match self.calibration.update_rail_homing(&counts, &self.contacts, limits) {
-                Ok(Some(position)) => self.home(&position),
-                Ok(None) => {}
-                Err(_) => self.supervisor.disarm(),
-            },
+            State::Homing => self.home_by_switches(&counts),
             State::Calibrated => self.calibration.update_sign_check(&counts, limits),
             State::Armed => self.tick_armed(&counts),
             State::Disarmed
@@ -366,18 +373,33 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
                 self.calibration.invalidate(&self.table.limits);
             }
             if fault.doubts_motor() {
-                self.jog.forget(self.cart_sign_counts());
+                self.jog.forget(self.jog_sign_counts());
             }
         }
         self.calibration.cancel();
         self.setpoint_commanded = false;
         self.supervisor.trip(Cause { fault, tick: self.tick, sensor });
+        self.let_go();
+    }
+
+    /// A tick of homing by the limit switches.
+    fn home_by_switches(&mut self, counts: &[i32; NY]) {
+        let found = self.calibration.update_rail_homing(counts, &self.contacts, &self.table.limits);
+        match found.and_then(|position| Ok((position, self.drive_to_switches(counts)?))) {
+            Ok((Some(position), true)) => self.home(&position),
+            Ok(_) => {}
+            Err(WrongTravel) => {
+                self.supervisor.disarm();
+                self.let_go();
+            }
+        }
     }
 
     fn home(&mut self, position: &[i32; NY]) {
         if self.supervisor.complete_homing().is_ok() {
             self.controller.encoders_mut().home(&self.raw_counts, position);
             self.calibration.set_homed();
+            self.slow_drive.want(0.0);
         }
     }
 }

@@ -16,7 +16,8 @@ const CENTRE: f32 = 0.25;
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Begins to shake the rig. `id` is that of the command.
     pub(super) fn begin_shaking(&mut self, shaking: Shaking, id: u64) -> Answer {
-        if !shaking.is_sound(self.table.force_limit_n) {
+        // Forces mean nothing to a drive with pulses.
+        if self.table.steps.is_some() || !shaking.is_sound(self.table.force_limit_n) {
             return Answer::Rejected(InvalidRequest::Shaking);
         }
         let counts = *self.controller.encoders().counts();
@@ -24,7 +25,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let position_m = self.controller.positions().iter().next().copied().unwrap_or_default();
         let [low, high] = limits.rail_m.map(|end| CENTRE * end);
         // Without a cart there is nothing to shake.
-        let hangs = links_hang(&counts, limits) && self.cart_sign_counts() > 0;
+        let hangs = links_hang(&counts, limits) && self.jog_sign_counts() > 0;
         let inhibits = self
             .inhibits_with_motor_off()
             .union(self.held_inhibit(id))

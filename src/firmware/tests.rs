@@ -251,14 +251,15 @@ fn a_held_key_keeps_the_motor_off_whatever_else_refuses_its_command() {
     assert!(!is_held_after_repeating(Request::KeepAlive), "which turns no motor on");
 }
 
-/// A board whose timer is set to `tick_s`.
-struct Timed {
+/// A board whose timer is set to `tick_s`, and that gives pulses or not.
+struct Timed<const PULSES: bool> {
     tick_s: f32,
     output: Output,
 }
 
-impl Board<SENSORS> for Timed {
+impl<const PULSES: bool> Board<SENSORS> for Timed<PULSES> {
     const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
+    const GIVES_PULSES: bool = PULSES;
 
     fn tick_s(&self) -> f32 {
         self.tick_s
@@ -281,10 +282,14 @@ impl Board<SENSORS> for Timed {
 
 /// The latched fault after Clear, and the tick that the firmware reports, on a board with this tick.
 fn on_a_board_with(tick_s: f32) -> (Option<Fault>, f32) {
+    on_board::<false>(&TABLE, tick_s)
+}
+
+fn on_board<const PULSES: bool>(table: &GainTable<STATES, SENSORS>, tick_s: f32) -> (Option<Fault>, f32) {
     let (mut commands, mut messages) = (Queue::<_, COMMANDS>::new(), Queue::<_, MESSAGES>::new());
     let ((mut to_task, commands), (messages, mut from_task)) = (commands.split(), messages.split());
-    let board = Timed { tick_s, output: Output::OFF };
-    let mut task = ControlTask::new(firmware(&TABLE, Reset::Power), board, commands, messages);
+    let board = Timed::<PULSES> { tick_s, output: Output::OFF };
+    let mut task = ControlTask::new(firmware(table, Reset::Power), board, commands, messages);
     for (id, request) in [(1, Request::Clear), (2, Request::Info)] {
         to_task.enqueue(Command { id, request }).unwrap();
         task.tick();
@@ -302,6 +307,17 @@ fn a_timer_with_another_tick_than_the_tables_keeps_the_motor_off_and_is_reported
     assert_eq!(on_a_board_with(TICK_S * 1.0005), (None, TICK_S), "whole cycles");
     assert_eq!(on_a_board_with(2.0 * TICK_S), (Some(Fault::Table), 2.0 * TICK_S));
     assert_eq!(on_a_board_with(f32::NAN).0, Some(Fault::Table));
+}
+
+#[test]
+fn a_drive_with_pulses_stays_off_on_a_board_that_gives_none() {
+    let map =
+        crate::table::StepMap { step_m: 1e-5, acceleration_limit_m_per_s2: 10.0, speed_limit_m_per_s: 0.5 };
+    let mut table = GainTable { motor: None, steps: Some(map), delay_ticks: 0, ..TABLE };
+    table.crc = table.checksum();
+    assert_eq!(table.check(), Ok(()));
+    assert_eq!(on_board::<false>(&table, TICK_S).0, Some(Fault::Table));
+    assert_eq!(on_board::<true>(&table, TICK_S).0, None);
 }
 
 #[test]

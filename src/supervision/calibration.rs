@@ -135,6 +135,26 @@ impl<const NY: usize> Calibration<NY> {
         }))
     }
 
+    /// Where a drive has to move the cart in homing by the limit switches, with the cart at these counts: the
+    /// direction, and, once both switches have been pressed, its distance from position 0 (counts).
+    ///
+    /// # Errors
+    /// [`WrongTravel`] if a switch is not where it should be; homing ends.
+    pub fn homing_way(&mut self, cart: i32, limits: &Limits<NY>) -> Result<(i32, Option<i32>), WrongTravel> {
+        let way = self.rail.way(cart, limits.travel_counts, limits.middle_counts);
+        if way.is_err() {
+            self.homing = Homing::WrongTravel;
+        }
+        way
+    }
+
+    /// Positions are not known any more; signs that are checked stay so.
+    pub fn forget_homing(&mut self) {
+        if self.homing == Homing::Homed {
+            self.homing = Homing::NotHomed;
+        }
+    }
+
     /// Cancels homing and a sign check that are in progress; what is finished stays.
     pub fn cancel(&mut self) {
         if matches!(self.homing, Homing::Touch { .. } | Homing::HoldStill) {

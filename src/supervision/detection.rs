@@ -9,7 +9,8 @@
 //! - *Not frozen*: while a counter stands still, the motion that the model predicts for it stays small. The predicted
 //!   motion is summed with a memory of [`MEMORY`] ticks, so that a small constant model error raises no alarm.
 //! - *Motor*: the innovation of the cart is compared with the one that a missing force `-u` would cause. Their ratio,
-//!   by least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one.
+//!   by least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one. For a
+//!   drive with pulses, whose count shows nothing, it is the innovation of the first link and a missing acceleration.
 
 use crate::supervision::fault::Fault;
 use crate::table::{MotorTest, Thresholds};
@@ -33,7 +34,10 @@ pub struct Finding {
 #[derive(Debug, Clone)]
 pub struct Detection<const NY: usize> {
     sensors: [SensorMemory; NY],
-    /// Error `(p, v)` of predicted position (m) and speed (m/s) that a missing force would have caused by now.
+    /// The sensor of the motor's test.
+    motor_sensor: u8,
+    /// Error `(p, v)` of predicted position and speed of that sensor (m, m/s) that a missing force would have caused by
+    /// now.
     missing: [f32; 2],
     /// Sum of `e p` (m²).
     correlation: f32,
@@ -58,6 +62,7 @@ impl<const NY: usize> Default for Detection<NY> {
     fn default() -> Self {
         Self {
             sensors: [SensorMemory::default(); NY],
+            motor_sensor: 0,
             missing: [0.0; 2],
             correlation: 0.0,
             energy: 0.0,
@@ -67,9 +72,16 @@ impl<const NY: usize> Default for Detection<NY> {
 }
 
 impl<const NY: usize> Detection<NY> {
+    /// Tests that have not begun, with the motor's test at this sensor: [`GainTable::motor_sensor`].
+    ///
+    /// [`GainTable::motor_sensor`]: crate::table::GainTable::motor_sensor
+    pub fn of_motor(sensor: usize) -> Self {
+        Self { motor_sensor: sensor as u8, ..Self::default() }
+    }
+
     /// Restarts the tests at positions `y` (m or rad); the number of rejected measurements stays.
     pub fn start(&mut self, counts: &[i32; NY], y: &[f32; NY]) {
-        *self = Self { rejected: self.rejected, ..Self::default() };
+        *self = Self { rejected: self.rejected, motor_sensor: self.motor_sensor, ..Self::default() };
         for ((sensor, &counts), &corrected) in self.sensors.iter_mut().zip(counts).zip(y) {
             (sensor.counts, sensor.corrected) = (counts, corrected);
         }
@@ -112,7 +124,10 @@ impl<const NY: usize> Detection<NY> {
             self.reject(thresholds, e)
         };
         // The innovation of a rejected measurement is 0: it says nothing about the motor.
-        let motor = self.test_motor(&thresholds.motor, e.first().copied().unwrap_or_default());
+        let motor = self.test_motor(
+            &thresholds.motor,
+            e.get(usize::from(self.motor_sensor)).copied().unwrap_or_default(),
+        );
         implausible.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
     }
 
@@ -144,7 +159,7 @@ impl<const NY: usize> Detection<NY> {
         self.correlation = KEEP * self.correlation + e * missing;
         self.energy = KEEP * self.energy + missing * missing;
         let found = self.energy > test.energy && self.correlation > test.ratio * self.energy;
-        found.then_some(Finding { fault: Fault::Motor, sensor: 0 })
+        found.then_some(Finding { fault: Fault::Motor, sensor: self.motor_sensor })
     }
 
     /// Second half of a tick: stores the corrected estimate of the sensors' positions (m or rad) and the force `u` (N)

@@ -290,6 +290,14 @@ impl Fault {
         matches!(self, Fault::Encoder | Fault::Frozen | Fault::Watchdog | Fault::Crash)
     }
 
+    /// Whether a drive with pulses may still bring the cart to rest after this fault, before it lets go of it. After
+    /// the others, it lets go at once: it or the firmware may be at fault, or something is in the cart's way.
+    pub fn leaves_drive_working(self) -> bool {
+        let of_cart = matches!(self, Fault::Rail | Fault::Speed | Fault::LimitSwitch | Fault::Saturated);
+        let of_links = matches!(self, Fault::Angle | Fault::Encoder | Fault::Frozen | Fault::TrackingError);
+        of_cart || of_links || self == Fault::LinkLost
+    }
+
     /// Whether the motor's sign has to be checked again after this fault: the motor, or the encoder that it was
     /// checked against, is in doubt.
     pub fn doubts_motor(self) -> bool {

@@ -21,7 +21,8 @@ pub enum Homing {
     HoldStill,
     /// Positions are known.
     Homed,
-    /// Not homed: the distance between the switches differs from the rig file's, or a switch does not open.
+    /// Not homed: the distance between the switches differs from the rig file's, a switch does not open, or a drive has
+    /// not come to it.
     WrongTravel,
 }
 
@@ -30,6 +31,8 @@ pub enum Homing {
 pub struct Rail {
     low: Option<i32>,
     high: Option<i32>,
+    /// Where a drive began to move it.
+    start: Option<i32>,
 }
 
 impl Rail {
@@ -64,8 +67,34 @@ impl Rail {
         if found.wrapping_sub(wanted).unsigned_abs() > tolerance.unsigned_abs() {
             return Err(WrongTravel);
         }
-        let middle_found = low.wrapping_add(found / 2);
-        Ok(Some(cart.wrapping_sub(middle_found).wrapping_add(middle)))
+        Ok(Some(position(cart, [low, high], middle)))
+    }
+
+    /// Where a drive has to move the cart: the direction, -1 to the low switch first, then 1 to the high one, and then
+    /// to position 0; and from then on the distance from there (counts). `travel` and `middle` as in
+    /// [`update`](Self::update).
+    ///
+    /// # Errors
+    /// [`WrongTravel`] if the high switch is pressed first, or no switch within the length of the rail.
+    pub fn way(
+        &mut self,
+        cart: i32,
+        travel: [i32; 2],
+        middle: i32,
+    ) -> Result<(i32, Option<i32>), WrongTravel> {
+        let start = *self.start.get_or_insert(cart);
+        let [wanted, tolerance] = travel;
+        let is_near =
+            |from: i32| cart.wrapping_sub(from).unsigned_abs() <= (wanted + tolerance).unsigned_abs();
+        match (self.low, self.high) {
+            (None, None) if is_near(start) => Ok((-1, None)),
+            (Some(low), None) if is_near(low) => Ok((1, None)),
+            (Some(low), Some(high)) => {
+                let left = position(cart, [low, high], middle);
+                Ok((-left.signum(), Some(left)))
+            }
+            _ => Err(WrongTravel),
+        }
     }
 
     /// Which switches have been pressed, or [`Homing::HoldStill`] after both.
@@ -77,7 +106,14 @@ impl Rail {
     }
 }
 
-/// The distance between the switches is not that of the rig file, or a switch is stuck.
+/// Position of the cart, if the switches were pressed at the counts `ends` and `middle` is the position between them.
+fn position(cart: i32, [low, high]: [i32; 2], middle: i32) -> i32 {
+    let middle_found = low.wrapping_add(high.wrapping_sub(low) / 2);
+    cart.wrapping_sub(middle_found).wrapping_add(middle)
+}
+
+/// The distance between the switches is not that of the rig file, a switch is stuck, or the drive did not come to the
+/// switch to which it was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WrongTravel;
 

@@ -32,6 +32,7 @@ pub mod inhibits;
 pub mod jog;
 pub mod shaking;
 pub mod sign_check;
+pub mod slow_drive;
 mod state;
 pub mod stillness;
 pub mod supervisor;

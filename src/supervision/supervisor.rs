@@ -58,6 +58,14 @@ impl Supervisor {
         self.state = State::Fault;
     }
 
+    /// Positions are not known any more.
+    pub fn lose_positions(&mut self) {
+        self.positions_known = false;
+        if self.state == State::Calibrated {
+            self.state = State::Disarmed;
+        }
+    }
+
     /// Turns the motor off; ends homing.
     pub fn disarm(&mut self) {
         match self.state {

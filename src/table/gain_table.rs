@@ -61,6 +61,12 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         checksum::checksum(self)
     }
 
+    /// The sensor that shows what the motor does (0: cart, 1: first link …). The count of a drive with pulses is what
+    /// it was told, so that only the links show what it has done.
+    pub fn motor_sensor(&self) -> usize {
+        usize::from(self.steps.is_some())
+    }
+
     /// Highest supply voltage of the power stage (V); no limit without motor data.
     #[inline]
     pub fn supply_max_v(&self) -> f32 {

@@ -3,7 +3,7 @@
 use super::Design;
 use super::kalman::rounding_variances;
 use super::tolerated::Tolerated;
-use crate::rig::Rig;
+use crate::rig::{CartInput, Rig};
 
 /// Share of the motor's force that may be missing.
 const MISSING_SHARE: f64 = 0.5;
@@ -21,7 +21,7 @@ pub struct DetectionDesign {
     pub motor: Option<MotorDesign>,
 }
 
-/// Constants of the motor's test.
+/// Constants of the motor's test, at the sensor [`motor_sensor`](upright::table::GainTable::motor_sensor).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorDesign {
     /// Dynamics of the error of predicted position and speed, [a_pp, a_pv, a_vp, a_vv].
@@ -67,26 +67,34 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
         .map(|((s, step), bound)| tolerated.mismatch * wider * (g * s.sqrt() + bound) + 0.5 * step)
         .collect();
     let rounding = rounding_variances(rig, steps);
+    // What a drive with pulses does to the cart is known only from its own count; the first link shows it.
+    let sensor = usize::from(rig.actuator.input() == CartInput::Acceleration);
     let frozen = (variances.iter().zip(steps).zip(rounding).zip(&tolerated.corrected)).map(
         |(((s, step), r), bound)| {
             let corrected = (s - r).max(0.0) / (1.0 - keep * keep);
             step + wider * (g * corrected.sqrt() + bound)
         },
     );
-    let wrong = f64::from(upright::supervision::detection::MEMORY).sqrt() * tolerated.innovation[0];
+    let mut frozen: Vec<f64> = frozen.collect();
+    if sensor > 0 {
+        // The prediction moves by up to a step between two pulses; the rest is for its rounding.
+        frozen[0] *= 1.5;
+    }
+    let wrong = f64::from(upright::supervision::detection::MEMORY).sqrt() * tolerated.innovation[sensor];
     let motor = rig.chain().is_some().then(|| {
         let (ad, bd, l) = (&design.ad, &design.bd, &kalman.l_filter);
-        let corrected = |row: usize| ad[(row, 0)] * (1.0 - l[(0, 0)]) - ad[(row, 1)] * l[(1, 0)];
+        let (p, v, variance) = (2 * sensor, 2 * sensor + 1, variances[sensor]);
+        let corrected = |row: usize| ad[(row, p)] * (1.0 - l[(p, sensor)]) - ad[(row, v)] * l[(v, sensor)];
         MotorDesign {
-            a: [corrected(0), ad[(0, 1)], corrected(1), ad[(1, 1)]],
-            b: [bd[(0, 0)], bd[(1, 0)]],
+            a: [corrected(p), ad[(p, v)], corrected(v), ad[(v, v)]],
+            b: [bd[(p, 0)], bd[(v, 0)]],
             ratio: MISSING_SHARE,
             energy: (g / MISSING_SHARE).powi(2)
-                * variances[0]
-                * (wider * (1.0 + wrong / (g * variances[0].sqrt()))).powi(2),
+                * variance
+                * (wider * (1.0 + wrong / (g * variance.sqrt()))).powi(2),
         }
     });
-    Some(DetectionDesign { deviations: g, innovation, frozen: frozen.collect(), motor })
+    Some(DetectionDesign { deviations: g, innovation, frozen, motor })
 }
 
 /// Number of standard deviations that a Gaussian exceeds, on either side, with this probability.

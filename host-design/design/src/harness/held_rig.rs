@@ -38,6 +38,11 @@ impl HeldRig {
         self.held.copy_from_slice(state);
     }
 
+    /// A drive moves the cart by this (m) while the links are held.
+    pub fn carry(&mut self, cart_m: f64) {
+        self.held[0] += cart_m;
+    }
+
     /// Sets all rates to 0.
     pub fn stop(&mut self) {
         self.held.iter_mut().skip(1).step_by(2).for_each(|rate| *rate = 0.0);

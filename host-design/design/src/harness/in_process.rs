@@ -141,6 +141,7 @@ struct Wires<const NY: usize> {
 
 impl<const NY: usize> Board<NY> for Wires<NY> {
     const WIDTHS: [CounterWidth; NY] = Bench::widths();
+    const GIVES_PULSES: bool = true;
 
     fn inputs(&mut self) -> Inputs<NY> {
         self.inputs

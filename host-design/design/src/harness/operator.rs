@@ -40,6 +40,8 @@ pub struct Operator {
     /// The request that turns the motor on.
     turn_on: Request,
     rig: HeldRig,
+    /// Travel per pulse (m) of a drive that takes them.
+    pulse_m: Option<f64>,
     start: Vec<f64>,
     /// A second rig, simulated while the motor pushes the cart: the random numbers and the state of the run's own rig
     /// must not depend on how it was started.
@@ -86,6 +88,7 @@ impl Operator {
                 Begin::Hanging => Request::Goto(Equilibrium::UPRIGHT),
             },
             rig: HeldRig::hanging(rig),
+            pulse_m: rig.actuator.acceleration.as_ref().map(|drive| drive.step_m),
             start: scenario.start.clone(),
             pushed: Bench::new(rig, &undisturbed)?,
             retry_ticks: ticks(RETRY_S),
@@ -100,9 +103,13 @@ impl Operator {
         self.rig.held()
     }
 
-    /// Whether the motor pushes the cart while the operator waits.
-    pub fn lets_the_motor_push(&self) -> bool {
-        self.doing == Doing::Push
+    /// Whether the firmware balances or raises the links, with this output and as far as its telemetry says. A drive
+    /// with pulses is on before, to hold the cart, so that the hand lets go when telemetry says so, a tick later.
+    pub fn has_let_go(&self, status: &Status, output: &Output) -> bool {
+        match self.pulse_m {
+            Some(_) => status.state.controls(),
+            None => output.enable && self.doing != Doing::Push,
+        }
     }
 
     /// What the operator does in tick number `tick`, when `output` was the firmware's last output; `None` once the
@@ -110,6 +117,9 @@ impl Operator {
     pub fn act(&mut self, tick: u32, status: &Status, output: &Output) -> Option<OperatorTick> {
         if status.state.controls() {
             return None;
+        }
+        if self.doing != Doing::Push {
+            self.rig.carry(f64::from(output.pulses()) * self.pulse_m.unwrap_or_default());
         }
         let request = match self.doing {
             Doing::Home => {
@@ -162,6 +172,8 @@ impl Operator {
             }
             Signs::Move(sensor) => self.rig.turn(sensor),
             Signs::Checked if status.motor == MotorSign::Checked => self.doing = Doing::Raise,
+            // The last sensor to be checked was a link's.
+            Signs::Checked if self.pulse_m.is_some() && !self.rig.rest() => {}
             Signs::Checked => self.doing = Doing::Settle(self.settle_ticks),
             Signs::Unchecked | Signs::Reversed(_) | Signs::Swapped { .. } => {}
         }

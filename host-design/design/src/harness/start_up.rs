@@ -119,7 +119,7 @@ impl<'t> Harness<'t> {
                 self.session.send(Request::Setpoint(position_m));
             }
             let output = self.by_hand(tick)?;
-            if output.enable && !self.operator.lets_the_motor_push() {
+            if self.operator.has_let_go(&self.session.status(), &output) {
                 return Ok(output);
             }
         }

@@ -115,7 +115,8 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
     }
 
     fn supervise(&mut self) {
-        let mut supervision = BalancingSupervision::default();
+        let detection = Detection::of_motor(self.table.motor_sensor());
+        let mut supervision = BalancingSupervision { detection, ..BalancingSupervision::default() };
         let positions = self.controller.positions();
         supervision.detection.start(self.controller.encoders().counts(), &positions.data.0[0]);
         self.supervision = Some(supervision);

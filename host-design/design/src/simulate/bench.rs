@@ -12,6 +12,17 @@ use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
 use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
 use crate::rig::{Chain, PlantDescription, Rig};
 
+/// What is wrong with a drive that takes pulses. The board counts its pulses whatever it does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StepDefect {
+    /// It is off: it lets go of a cart that its motor moved; without a motor, the cart stands.
+    Off,
+    /// The cart is stuck.
+    Jammed,
+    /// It misses this share of its pulses.
+    Misses(f64),
+}
+
 /// The simulated rig: everything outside the controller.
 pub struct Bench {
     plant: Box<dyn Plant>,
@@ -20,6 +31,10 @@ pub struct Bench {
     step_m: Option<f64>,
     /// Its pulses so far, from position 0.
     pulses: i64,
+    /// Those that it has missed.
+    missed: i64,
+    /// What is wrong with it in the next tick.
+    step_defect: Option<StepDefect>,
     /// Its motor, unless it goes where its pulses say.
     step_motor: Option<StepMotor>,
     driver: Option<Driver>,
@@ -71,6 +86,8 @@ impl Bench {
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
             step_m,
             pulses: step_m.map_or(0, |step_m| nearest(scenario.start[0] / step_m)),
+            missed: 0,
+            step_defect: None,
             step_motor,
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
@@ -106,6 +123,12 @@ impl Bench {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
         self.pulses = self.step_m.map_or(0, |step_m| nearest(state[0] / step_m));
+        self.missed = 0;
+    }
+
+    /// Spoils a drive with pulses in the next tick.
+    pub fn spoil(&mut self, defect: StepDefect) {
+        self.step_defect = Some(defect);
     }
 
     /// Widths of the hardware counters: 32 bits for the cart, 16 for the links.
@@ -185,7 +208,7 @@ impl Bench {
     /// start of the tick (N), without the disturbance; 0 for a drive that imposes the cart's motion.
     pub fn tick(&mut self, drive: Drive) -> f64 {
         if let Some(step_m) = self.step_m {
-            self.step(if let Drive::Steps(pulses) = drive { pulses } else { 0 }, step_m);
+            self.step(drive, step_m);
             return 0.0;
         }
         let (now, disturbance) = self.begin(drive);
@@ -197,14 +220,24 @@ impl Bench {
         self.advance(now, disturbance, rest)
     }
 
-    /// Simulates one tick of a drive that imposes the cart's motion by `pulses`, spread evenly. Without a motor they
-    /// are a constant speed, and forces on the cart change nothing. Without pulses, as when the drive is off, the cart
-    /// stands.
-    fn step(&mut self, pulses: i32, step_m: f64) {
+    /// Simulates one tick of a drive that imposes the cart's motion by pulses, spread evenly. Without a motor they are
+    /// a constant speed, and forces on the cart change nothing. A drive that is off lets go of a cart that its motor
+    /// moved; without a motor, the cart stands.
+    fn step(&mut self, drive: Drive, step_m: f64) {
         let (_, disturbance) = self.begin(Drive::OFF);
-        let before = self.pulses;
+        let (pulses, is_on) = if let Drive::Steps(pulses) = drive { (pulses, true) } else { (0, false) };
+        let defect = self.step_defect.take();
+        let missed = match defect {
+            None => 0.0,
+            Some(StepDefect::Off | StepDefect::Jammed) if self.step_motor.is_some() => 0.0,
+            Some(StepDefect::Off | StepDefect::Jammed) => f64::from(pulses),
+            Some(StepDefect::Misses(share)) => (share * f64::from(pulses)).round(),
+        };
+        let is_on = is_on && defect != Some(StepDefect::Off);
+        let (before, arrive) = (self.pulses - self.missed, f64::from(pulses) - missed);
         self.pulses += i64::from(pulses);
-        let speed = f64::from(pulses) * step_m / self.period_s;
+        self.missed += missed as i64;
+        let speed = arrive * step_m / self.period_s;
         let Some(motor) = &self.step_motor else {
             self.plant.set_cart_speed(speed);
             self.plant.advance(0.0, &self.torques, self.period_s, self.substeps);
@@ -214,9 +247,12 @@ impl Bench {
         let parts = motor.parts(self.period_s);
         for part in 0..parts {
             // Pulse j of n begins at (j + 1/2) / n of the tick.
-            let given = ((part as f64 + 0.5) / parts as f64 * f64::from(pulses)).round() as i64;
+            let given = ((part as f64 + 0.5) / parts as f64 * arrive).round() as i64;
             let commanded = [(before + given) as f64 * step_m, speed];
-            let force = motor.force_n(commanded, [self.state[0], self.state[1]]);
+            if defect == Some(StepDefect::Jammed) {
+                self.plant.set_cart_speed(0.0);
+            }
+            let force = if is_on { motor.force_n(commanded, [self.state[0], self.state[1]]) } else { 0.0 };
             self.plant.advance(force + disturbance, &self.torques, self.period_s / parts as f64, 1);
             self.plant.write_state(&mut self.state);
         }

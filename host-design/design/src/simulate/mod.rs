@@ -27,7 +27,7 @@ mod scenario;
 mod summary;
 mod trace;
 
-pub use bench::Bench;
+pub use bench::{Bench, StepDefect};
 pub use closed_loop::{run, simulate, ticks};
 pub use error::SimulationError;
 pub use hand_push::HandPush;

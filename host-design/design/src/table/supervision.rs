@@ -58,7 +58,9 @@ fn set_limits_of_chain(
     limits.middle_counts = counts(0.5 * (low + high), cart);
     let slow = |rate: f64, step: f64| counts(rate * wanted.arm_time_s, step).max(1);
     limits.slow_counts[0] = slow(wanted.arm_speed_m_per_s, cart);
-    limits.sign_counts[0] = counts(SIGN_SHARE * length, cart).max(1);
+    // The count of a drive with pulses has the sign of the pulses.
+    let has_encoder = rig.actuator.acceleration.is_none();
+    limits.sign_counts[0] = if has_encoder { counts(SIGN_SHARE * length, cart).max(1) } else { 0 };
     for (joint, &step) in joints.iter().enumerate() {
         let sensor = joint + 1;
         limits.slow_counts[sensor] = slow(wanted.arm_rate_rad_per_s, step);

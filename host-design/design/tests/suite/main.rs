@@ -1,6 +1,7 @@
 //! Tests of rig files, plant, design, simulation and verification. One program, so that linking happens once.
 
 mod acceleration;
+mod acceleration_firmware;
 mod acceleration_motor;
 mod design_properties;
 mod homing;
