@@ -136,7 +136,7 @@ fn a_delay_margin_of_many_ticks_is_that_of_the_eigenvalues() {
         let rig = Rig::from_toml(&text, Path::new("slow.toml")).unwrap();
         let (certified, table) = designed(&rig);
         let report = linear(&rig, certified, &table).unwrap().remove(0);
-        let model = LoopModel::<f64>::as_it_runs(certified, &table, report.law);
+        let model = LoopModel::<f64>::as_it_runs(certified, &table, report.law).unwrap();
         let ticks = report.margins.unwrap().delay_margin_ticks.unwrap();
         assert!(ticks > 40.0, "{ticks}");
         assert!(radius_with_delay(&model, ticks.floor() as usize) < 1.0, "{ticks}");
