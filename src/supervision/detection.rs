@@ -34,7 +34,7 @@ pub struct Finding {
 #[derive(Debug, Clone)]
 pub struct Detection<const NY: usize> {
     sensors: [SensorMemory; NY],
-    /// The sensor of the motor's test.
+    /// The sensor of the motor's test: 0, the cart, or 1, the first link.
     motor_sensor: u8,
     /// Error `(p, v)` of predicted position and speed of that sensor (m, m/s) that a missing force would have caused by
     /// now.
@@ -124,10 +124,9 @@ impl<const NY: usize> Detection<NY> {
             self.reject(thresholds, e)
         };
         // The innovation of a rejected measurement is 0: it says nothing about the motor.
-        let motor = self.test_motor(
-            &thresholds.motor,
-            e.get(usize::from(self.motor_sensor)).copied().unwrap_or_default(),
-        );
+        // With constant indices, the processor has no bound to check.
+        let e_motor = if self.motor_sensor == 0 { e.first() } else { e.get(1) };
+        let motor = self.test_motor(&thresholds.motor, e_motor.copied().unwrap_or_default());
         implausible.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
     }
 

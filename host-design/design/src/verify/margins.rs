@@ -221,8 +221,8 @@ fn delay_margin(
     first_failure(unstable, |i| step * f64::from(i), 72, 1e-9).map(|found| found.map(|bracket| bracket.1))
 }
 
-/// A long delay margin (ticks). Whole ticks only turn the phase; so the fraction of a tick is part of the model, and the
-/// crossovers of that model say how many ticks there are. They depend little on the fraction: a few rounds agree.
+/// A long delay margin (ticks). Whole ticks only turn the phase: the model has the fraction of a tick, and its
+/// crossovers say how many ticks remain. These depend little on the fraction, so a few rounds agree.
 fn long_delay_margin(
     certified: &Certified,
     numbers: &Numbers<f64>,
