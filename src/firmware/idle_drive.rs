@@ -19,6 +19,9 @@ const FIRST_LINK: usize = 1;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// The output for a drive with pulses in a tick without the control law.
+    // Not inlined into the tick, whose registers it would take.
+    #[cold]
+    #[inline(never)]
     pub(super) fn idle(&mut self, steps: &StepMap) -> Output {
         if core::mem::take(&mut self.is_controlled) {
             self.slow_drive.take_over(self.controller.estimate().get(1).copied().unwrap_or_default());
@@ -46,6 +49,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// A drive with pulses is to let go of the cart: nobody knows where it is from then on.
+    #[cold]
+    #[inline(never)]
     pub(super) fn let_go(&mut self) {
         if self.table.steps.is_some() {
             self.slow_drive.want(0.0);
