@@ -91,7 +91,11 @@ fn run(
         if !harness.ask_for(tick as usize, &goals) && tick.is_multiple_of(keep_alive) {
             harness.session.send(Request::KeepAlive);
         }
-        harness.bench.pull(pull_n(f64::from(tick) * rig.tick.period_s, table, rounding), &[]);
+        let pull = pull(f64::from(tick) * rig.tick.period_s, table, rounding);
+        match table.steps {
+            Some(_) => harness.bench.pull(0.0, &[pull]),
+            None => harness.bench.pull(pull, &[]),
+        }
         harness.bench.tick(output.drive);
         let mut inputs = harness.inputs();
         if tick >= ticks - ticks / 10
@@ -115,14 +119,15 @@ fn run(
     Ok(Fingerprint { table: String::new(), run: Some(hex(&hash.finalize())), ticks: spent, fault })
 }
 
-/// A pull on the cart (N): three triangular waves, which need no function that machines compute differently.
-fn pull_n(t_s: f64, table: &TableValues, rounding: PullRounding) -> f64 {
+/// A pull on the cart (N), or on the first joint (N·m) where pulses say where the cart is: three triangular waves,
+/// which need no function that machines compute differently.
+fn pull(t_s: f64, table: &TableValues, rounding: PullRounding) -> f64 {
     let wave = |period_s: f64| 2.0 * (2.0 * (t_s / period_s).fract() - 1.0).abs() - 1.0;
-    let unit_n = 0.002 * f64::from(table.force_limit_n);
-    let [a, b, c] = [wave(1.3), wave(0.37), wave(0.11)].map(|wave| unit_n * wave);
+    let unit = if table.steps.is_some() { 2e-4 } else { 0.002 * f64::from(table.force_limit_n) };
+    let [a, b, c] = [wave(1.3), wave(0.37), wave(0.11)].map(|wave| unit * wave);
     match rounding {
         PullRounding::AsWritten => a + b + c,
-        PullRounding::Fused => unit_n.mul_add(wave(1.3), b) + c,
+        PullRounding::Fused => unit.mul_add(wave(1.3), b) + c,
         PullRounding::OtherOrder => a + (b + c),
     }
 }
@@ -142,16 +147,18 @@ mod tests {
 
     #[test]
     fn a_difference_in_the_last_bit_of_one_force_is_noticed() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/single-quanser-ip02.toml");
-        let rig = Rig::from_path(&file).unwrap();
-        let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-        let of = |rounding| Fingerprint::of(&rig, &table, rounding, 10_000).unwrap();
-        let (first, again) = (of(PullRounding::AsWritten), of(PullRounding::AsWritten));
-        assert_eq!(first, again);
-        assert!(first.ticks[0] > 8000 && first.fault.is_some(), "{first:?}");
-        for planted in [PullRounding::Fused, PullRounding::OtherOrder] {
-            let planted = of(planted);
-            assert!(planted.run != first.run && planted.table == first.table, "{planted:?}");
+        for name in ["single-quanser-ip02", "single-stepper", "double-stepper", "quadruple-stepper"] {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
+            let rig = Rig::from_path(&file).unwrap();
+            let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+            let of = |rounding| Fingerprint::of(&rig, &table, rounding, 10_000).unwrap();
+            let (first, again) = (of(PullRounding::AsWritten), of(PullRounding::AsWritten));
+            assert_eq!(first, again);
+            assert!(first.ticks[0] > 8000 && first.fault.is_some(), "{first:?}");
+            for planted in [PullRounding::Fused, PullRounding::OtherOrder] {
+                let planted = of(planted);
+                assert!(planted.run != first.run && planted.table == first.table, "{planted:?}");
+            }
         }
     }
 }

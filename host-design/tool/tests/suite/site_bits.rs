@@ -13,10 +13,8 @@ use upright_tool::site::module;
 
 use crate::equipment::{is_required, not_exercised};
 
-/// Rigs that the firmware does not run on the host: a model with ten states, of which only the table is compared, and
-/// steppers, which it does not begin to balance.
-const NO_FIRMWARE: [&str; 4] =
-    ["quadruple-paper-printed", "single-stepper", "double-stepper", "quadruple-stepper"];
+/// Rigs that the firmware does not run on the host: a model with ten states, of which only the table is compared.
+const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
 
 /// All rigs of the project: name, text, stored motions.
 fn rigs() -> Vec<(String, String, Option<String>)> {
