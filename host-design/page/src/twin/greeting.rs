@@ -61,8 +61,11 @@ fn group(kind: Defect) -> &'static str {
     match kind {
         kind if kind.has_sensor() || kind == Defect::CartEncoderFrozen => "Encoders",
         Defect::MotorDead | Defect::MotorReversed | Defect::MotorStuck | Defect::MotorWeak => "Motor",
-        Defect::SupplyNotANumber | Defect::SupplySag | Defect::SupplyDip | Defect::SupplySurge => "Supply",
-        Defect::SupplySpike => "Supply",
+        Defect::SupplyNotANumber
+        | Defect::SupplySag
+        | Defect::SupplyDip
+        | Defect::SupplySurge
+        | Defect::SupplySpike => "Supply",
         Defect::EmergencyStop | Defect::DriverFault | Defect::LimitSwitch => "Contacts",
         Defect::OneOverrun | Defect::Overruns | Defect::Push => "Time and touch",
         _ => "Serial line",

@@ -1,10 +1,11 @@
 //! The rigs from which a person can start.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use upright_design::swing_up::Stored;
 
 use super::error::SiteError;
+use super::files::toml_files;
 use super::page::Example;
 
 /// The rig files in `folder`, by name.
@@ -12,22 +13,10 @@ use super::page::Example;
 /// # Errors
 /// [`SiteError::File`] if one cannot be read.
 pub fn examples(folder: &Path) -> Result<Vec<Example>, SiteError> {
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        |source| SiteError::File { path, source }
+    let example = |(file, toml): (PathBuf, String)| Example {
+        name: file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        toml,
+        motions: std::fs::read_to_string(Stored::path_beside(&file)).ok(),
     };
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(failed(folder))? {
-        files.push(entry.map_err(failed(folder))?.path());
-    }
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
-    files.sort();
-    let example = |file: &std::path::PathBuf| {
-        Ok(Example {
-            name: file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            toml: std::fs::read_to_string(file).map_err(failed(file))?,
-            motions: std::fs::read_to_string(Stored::path_beside(file)).ok(),
-        })
-    };
-    files.iter().map(example).collect()
+    Ok(toml_files(folder)?.into_iter().map(example).collect())
 }

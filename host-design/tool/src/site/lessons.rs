@@ -1,33 +1,21 @@
 //! The exercises of the page, as their authors write them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use toml_edit::{DocumentMut, Item, TomlError, Value as TomlValue};
 use upright_page::Lesson;
 
 use super::error::SiteError;
+use super::files::toml_files;
 
 /// The exercises in `folder`, in the order of their files' names.
 ///
 /// # Errors
 /// [`SiteError::File`] if a file cannot be read, [`SiteError::Lesson`] if it is no exercise.
 pub fn lessons(folder: &Path) -> Result<Vec<Lesson>, SiteError> {
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        |source| SiteError::File { path, source }
-    };
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(failed(folder))? {
-        files.push(entry.map_err(failed(folder))?.path());
-    }
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
-    files.sort();
-    let read = |file: &std::path::PathBuf| {
-        let text = std::fs::read_to_string(file).map_err(failed(file))?;
-        lesson(&text).map_err(|why| SiteError::Lesson { path: file.clone(), why })
-    };
-    files.iter().map(read).collect()
+    let read = |(path, text): (PathBuf, String)| lesson(&text).map_err(|why| SiteError::Lesson { path, why });
+    toml_files(folder)?.into_iter().map(read).collect()
 }
 
 fn lesson(text: &str) -> Result<Lesson, String> {

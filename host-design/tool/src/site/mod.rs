@@ -11,6 +11,7 @@
 
 mod error;
 mod examples;
+mod files;
 mod lessons;
 mod module;
 mod motions;
