@@ -43,6 +43,7 @@ mod transitions_command;
 mod twin_access;
 mod twin_guide;
 mod twin_page;
+mod twin_reload;
 mod verify_command;
 mod virtual_board;
 

@@ -21,6 +21,8 @@ pub(crate) struct Browser {
     session: Option<String>,
     /// Selector of the page inside the page in which expressions are evaluated; none for the page itself.
     pub(crate) inside: Option<&'static str>,
+    /// Whether the pages opened from now on are told that the person prefers reduced motion.
+    pub(crate) reduces_motion: bool,
     _profile: tempfile::TempDir,
 }
 
@@ -81,6 +83,7 @@ impl Browser {
             sent: 0,
             session: None,
             inside: None,
+            reduces_motion: false,
             _profile: profile,
         };
         let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
@@ -120,8 +123,10 @@ impl Browser {
     pub(crate) fn open_address(&mut self, address: &str, width: u32, scheme: &str, medium: &str) {
         let metrics = json!({ "width": width, "height": 844, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", metrics);
-        let feature = json!({ "name": "prefers-color-scheme", "value": scheme });
-        self.call("Emulation.setEmulatedMedia", json!({ "media": medium, "features": [feature] }));
+        let motion = if self.reduces_motion { "reduce" } else { "no-preference" };
+        let features = [("prefers-color-scheme", scheme), ("prefers-reduced-motion", motion)]
+            .map(|(name, value)| json!({ "name": name, "value": value }));
+        self.call("Emulation.setEmulatedMedia", json!({ "media": medium, "features": features }));
         self.events.clear();
         self.call("Page.navigate", json!({ "url": address }));
         while !self.events.iter().any(|event| event["method"] == "Page.loadEventFired") {
