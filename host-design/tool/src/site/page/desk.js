@@ -186,7 +186,7 @@ function csvOfRun() {
 }
 
 // The stored motions of the example that the rig began as; they are used if it has not changed.
-async function motions() {
+function motions() {
   const example = examples.find(({ name }) => name === desk.sketch.rig);
   return example === undefined ? null : motionsOf(example);
 }
@@ -223,8 +223,8 @@ function listen() {
   }
   byId('law').addEventListener('change', () => { showLoop(); showDesign(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
-  byId('balance').addEventListener('click', async () => {
-    twin.open({ toml: editor.value, motions: await motions(), upright: byId('raised').checked });
+  byId('balance').addEventListener('click', () => {
+    twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked });
   });
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
@@ -254,7 +254,7 @@ async function begin() {
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
   editor.set(rigOfLink() ?? first.toml);
-  const module = await inflated('module');
+  const module = bytesOf('module');
   checker = new Thread(module);
   designer = new Thread(module);
   twin = new Twin(module, (why) => tell(why, true));
