@@ -10,8 +10,10 @@ use crate::parallel::{self, Progress, ProgressStep};
 
 /// Begin and end of the part of the log that is used (s).
 const TIME_S: [f64; 2] = [0.5, 5.0];
-/// Iterations for each wiring.
+/// Iterations for each wiring, and then for so many of the best ones.
+const FIRST_ITERATIONS: usize = 1;
 const ITERATIONS: usize = 4;
+const FINALISTS: usize = 8;
 /// Wrong counts per turn that are tried.
 const FACTORS: [f64; 6] = [0.25, 1.0 / 3.0, 0.5, 2.0, 3.0, 4.0];
 /// A wiring other than that of the file is believed when the residuals are smaller by this factor.
@@ -160,13 +162,26 @@ impl Wiring {
         (0..1 << channels).map(of).collect()
     }
 
-    /// This wiring with one more fault that is no sign.
+    /// This wiring with one more fault that is no sign: another pair, or an encoder whose counts are not yet wrong.
     fn with_another(&self) -> Vec<Self> {
         let pairs = (1..self.channels)
             .flat_map(|one| (one + 1..self.channels).map(move |other| WiringFault::Swapped(one, other)));
         let counts =
             (0..self.channels).flat_map(|channel| FACTORS.map(|factor| WiringFault::Counts(channel, factor)));
-        pairs.chain(counts).map(|fault| self.with(fault)).collect()
+        let is_of = |channel, fault: &WiringFault| matches!(*fault, WiringFault::Counts(of, _) if of == channel);
+        let is_new = |fault: &WiringFault| match *fault {
+            WiringFault::Counts(channel, _) => !self.faults.iter().any(|other| is_of(channel, other)),
+            _ => !self.faults.contains(fault),
+        };
+        pairs.chain(counts).filter(is_new).map(|fault| self.with(fault)).collect()
+    }
+
+    /// Whether both have the same faults and undo them in the same way: the order matters only for exchanged encoders.
+    fn is_same(&self, other: &Self) -> bool {
+        let exchanges = self.faults.iter().any(|fault| matches!(fault, WiringFault::Swapped(..)));
+        let same_set = self.faults.len() == other.faults.len()
+            && self.faults.iter().all(|fault| other.faults.contains(fault));
+        if exchanges { self.faults == other.faults } else { same_set }
     }
 }
 
@@ -176,10 +191,11 @@ fn scaled(row: &[f64], channel: usize, factor: f64) -> Vec<f64> {
     row
 }
 
-/// The wirings that are tried first, that of the file before all others.
-fn wirings(channels: usize) -> Vec<Wiring> {
+/// The wiring of the file, and the others that are tried first.
+fn wirings(channels: usize) -> (Wiring, Vec<Wiring>) {
     let file = Wiring { faults: Vec::new(), channels };
-    Wiring::signs(channels).into_iter().chain(file.with_another()).collect()
+    let others = Wiring::signs(channels).into_iter().skip(1).chain(file.with_another()).collect();
+    (file, others)
 }
 
 /// Fits a few iterations with each wiring.
@@ -187,10 +203,10 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
     let short = record.part(TIME_S[0], TIME_S[1]);
     let short = if short.pieces.is_empty() { record.clone() } else { short };
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-    let score = |wiring: &Wiring| {
+    let score = |wiring: &Wiring, iterations: usize| {
         let record = wiring.undone(&short);
         let shooting = Shooting { model, record: &record, priors, free: true };
-        let fit = shooting.fit_settled(&start, WINDOW_S, ITERATIONS, 1);
+        let fit = shooting.fit_settled(&start, WINDOW_S, iterations, 1);
         // Relative to the motion: a factor on the counts must not make residuals small. With `max` alone, a fit that
         // has diverged would be the best.
         let of = |(channel, &rms): (usize, &f64)| match rms.is_finite() {
@@ -201,20 +217,32 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
         progress(ProgressStep::Done);
         (score, wiring.clone())
     };
-    let first = wirings(record.channels);
-    progress(ProgressStep::Begin("wiring", first.len() as u64));
-    let mut scores = parallel::map(&first, score);
-    let of_file = scores[0].0;
     let sort = |scores: &mut Vec<(f64, Wiring)>| scores.sort_by(|one, other| one.0.total_cmp(&other.0));
+    // All of them with few iterations, then the best ones with all.
+    let judge = |wirings: &[Wiring]| {
+        let mut scores = parallel::map(wirings, |wiring| score(wiring, FIRST_ITERATIONS));
+        sort(&mut scores);
+        scores.truncate(FINALISTS);
+        parallel::map(&scores, |(_, wiring)| score(wiring, ITERATIONS))
+    };
+    let (file, others) = wirings(record.channels);
+    progress(ProgressStep::Begin("wiring", (1 + others.len() + FINALISTS) as u64));
+    let (of_file, file) = score(&file, ITERATIONS);
+    let mut scores = judge(&others);
+    scores.push((of_file, file));
     sort(&mut scores);
     for _ in 0..ROUNDS {
         if scores[0].1.faults.is_empty() || scores[0].0 < libm::log(EXPLAINED) + least(&short) {
             break;
         }
-        let more: Vec<Wiring> =
-            scores.iter().take(BEAM).flat_map(|(_, wiring)| wiring.with_another()).collect();
-        progress(ProgressStep::Begin("more faults of the wiring", more.len() as u64));
-        scores.extend(parallel::map(&more, score));
+        let mut more: Vec<Wiring> = Vec::new();
+        for wiring in scores.iter().take(BEAM).flat_map(|(_, wiring)| wiring.with_another()) {
+            if !more.iter().any(|other| other.is_same(&wiring)) {
+                more.push(wiring);
+            }
+        }
+        progress(ProgressStep::Begin("more faults of the wiring", (more.len() + FINALISTS) as u64));
+        scores.extend(judge(&more));
         sort(&mut scores);
     }
     WiringFound {

@@ -307,7 +307,7 @@ impl VirtualBoard {
             // A panic that cannot be reported is an undefined instruction, which is a processor fault.
             InjectedFault::Panic | InjectedFault::HardFault => {
                 self.run(begin + INSIDE)?;
-                debug_assert!(self.board.exception() == SYS_TICK || self.board.resets() > 0);
+                assert!(self.board.exception() == SYS_TICK || self.board.resets() > 0);
                 self.board.apply(Input::Jump(NOWHERE));
                 Ok(())
             }
