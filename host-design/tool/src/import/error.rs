@@ -22,7 +22,7 @@ pub enum ImportError {
         what: &'static str,
     },
     /// Something that should be numbers is not.
-    #[error("line {line}: {attribute} = {value:?}: give {count} numbers")]
+    #[error("line {line}: {attribute} = {value:?}: numbers wanted here: {count}")]
     Numbers {
         /// Line of the file.
         line: u32,
