@@ -30,6 +30,7 @@ mod linear;
 mod loop_model;
 mod margins;
 mod monte_carlo;
+mod needed_force;
 mod noise_runs;
 mod pushes;
 mod report;
