@@ -139,7 +139,12 @@ mod tests {
         let of =
             |key: &str| rows(last).iter().find(|row| row[0] == key).unwrap()[1].as_str().unwrap().to_owned();
         assert!(of("rail_tilt_rad").contains("4 of 4 survive,"), "{}", of("rail_tilt_rad"));
-        eprintln!("{:#}", json!(rows(last)));
+        // Negative control: more than the motor's supervision tolerates, and what a good machine has.
+        let friction = of("cart_friction_n");
+        assert!(
+            friction.contains("2 N: 0 of 4 survive (fault ") && friction.contains("; 0.2 N: 4 of 4 "),
+            "{friction}"
+        );
     }
 
     #[test]

@@ -152,6 +152,11 @@ fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
     let first_gain = "upright.desk.design.laws[0].continuous.k[0]";
     until(&mut browser, &format!("document.getElementById('problem').hidden && {first_gain} < 2"));
 
+    // A page that is loaded again has the rig as it was.
+    let address = browser.value("location.href");
+    browser.open_address(address.as_str().unwrap(), 1280, "light", "screen");
+    until(&mut browser, &format!("upright.desk.design && upright.desk.poles && {first_gain} < 2"));
+
     // A weight that is moved changes text and gains.
     browser.value(
         "{ const weight = document.getElementById('weight-lqr.force_weight'); weight.value = 0; \

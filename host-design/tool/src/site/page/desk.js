@@ -3,6 +3,7 @@
 const examples = JSON.parse(embedded('examples'));
 const DEGREES = 180 / Math.PI;
 const LEAST_MS = 16;
+const KEPT = 'upright rig'; // name in the tab's store
 const NEEDS_TABLE = ['save-table', 'save-header', 'save-csv', 'balance', 'connect', 'verify'];
 
 const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, error: null };
@@ -261,11 +262,17 @@ function open(text) {
   changed();
 }
 
+// The tab's store, from which a page that is loaded again takes its rig; null where the person forbids it.
+function kept() {
+  try { return sessionStorage; } catch { return null; }
+}
+
 async function begin() {
   listen();
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
-  editor.set(rigOfLink() ?? first.toml);
+  editor.set(rigOfLink() ?? kept()?.getItem(KEPT) ?? first.toml);
+  addEventListener('pagehide', () => kept()?.setItem(KEPT, editor.value));
   const module = bytesOf('module');
   checker = new Thread(module);
   designer = new Thread(module);
