@@ -152,10 +152,13 @@ fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
     let first_gain = "upright.desk.design.laws[0].continuous.k[0]";
     until(&mut browser, &format!("document.getElementById('problem').hidden && {first_gain} < 2"));
 
-    // A page that is loaded again has the rig as it was.
+    // A page that is loaded again has the rig as it was; for who prefers reduced motion, the run does not play by itself.
+    until(&mut browser, "upright.desk.at > 0");
+    browser.reduces_motion = true;
     let address = browser.value("location.href");
     browser.open_address(address.as_str().unwrap(), 1280, "light", "screen");
     until(&mut browser, &format!("upright.desk.design && upright.desk.poles && {first_gain} < 2"));
+    assert_eq!(browser.value("upright.desk.at"), 0);
 
     // A weight that is moved changes text and gains.
     browser.value(
