@@ -10,6 +10,7 @@ use upright_design::harness::{HarnessError, endless_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
+use super::connected::{ConnectedBoard, Exchange};
 use super::console::Console;
 use super::greeting::{breakable, greeting};
 use super::property::Properties;
@@ -33,6 +34,10 @@ enum TwinQuestion {
     /// What the person asks for, then the ticks that are due after `passed_s` of real time, but at most `most_ticks`.
     /// A person who `is_silent` for too long is no longer in command.
     Run { asked: Vec<PageRequest>, passed_s: f64, most_ticks: u32, is_silent: bool },
+    /// Begins a conversation with the real board of this rig.
+    Connect { toml: String, motions: Option<String> },
+    /// Goes on with that conversation.
+    Exchange(Exchange),
 }
 
 /// The twin of a page; it answers questions in JSON with objects in JSON.
@@ -41,6 +46,7 @@ enum TwinQuestion {
 #[derive(Default)]
 pub struct InPage {
     twin: Option<Twin>,
+    board: Option<ConnectedBoard>,
 }
 
 struct Twin {
@@ -58,7 +64,8 @@ enum Power {
 }
 
 impl InPage {
-    /// Answers `start` with `hello`, and `run` with a `picture`. A question that cannot be answered gives `failed`.
+    /// Answers `start` and `connect` with `hello`, `run` and `exchange` with a `picture`. A question that cannot be
+    /// answered gives `failed`.
     pub fn answer(&mut self, question: &str) -> String {
         let answer = serde_json::from_str(question)
             .map_err(PageRefusal::from)
@@ -77,6 +84,15 @@ impl InPage {
             TwinQuestion::Run { asked, passed_s, most_ticks, is_silent } => {
                 let twin = self.twin.as_mut().ok_or(PageRefusal::NoTwin)?;
                 Ok(twin.run(asked, [passed_s, f64::from(most_ticks)], is_silent))
+            }
+            TwinQuestion::Connect { toml, motions } => {
+                let (board, told) = ConnectedBoard::of(&toml, motions.as_deref())?;
+                self.board = Some(board);
+                Ok(told)
+            }
+            TwinQuestion::Exchange(exchange) => {
+                let board = self.board.as_mut().ok_or(PageRefusal::NoBoard)?;
+                Ok(board.exchange(exchange))
             }
         }
     }

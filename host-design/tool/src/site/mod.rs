@@ -15,6 +15,7 @@ mod files;
 mod lessons;
 mod module;
 mod motions;
+mod packed;
 mod page;
 mod twin;
 

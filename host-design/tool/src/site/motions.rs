@@ -9,7 +9,7 @@ const AS_IT_IS: u8 = 128;
 
 /// A file of stored motions as its text without the knots, and the bytes of the knots: per motion, column by column,
 /// each byte of all numbers together. `None` if it is no such file.
-pub(super) fn packed(text: &str) -> Option<(String, Vec<u8>)> {
+pub(super) fn without_knots(text: &str) -> Option<(String, Vec<u8>)> {
     let mut stored: Value = serde_json::from_str(text).ok()?;
     let mut bytes = Vec::new();
     for name in ["raise", "lower"] {

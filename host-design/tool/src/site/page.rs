@@ -1,30 +1,32 @@
 //! The page in one file: module, examples, scripts and styles are in it, so it needs no network and no server.
 
-use miniz_oxide::deflate::compress_to_vec_zlib;
 use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use upright::protocol::BAUD;
 use upright_page::Lesson;
 
-use super::motions::packed;
+use super::motions::without_knots;
+use super::packed::packed;
 use super::twin::{TwinPage, bare};
 use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 
 const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
-const WORKER: &str = concat!(include_str!("page/worker.js"), include_str!("page/running.js"));
-const SCRIPTS: [&str; 7] = [
+const WORKER: &str =
+    concat!(include_str!("page/worker.js"), include_str!("page/running.js"), include_str!("page/talking.js"));
+const SCRIPTS: [&str; 10] = [
+    include_str!("page/lzma.js"),
     include_str!("page/link.js"),
     include_str!("page/motions.js"),
     include_str!("page/drawing.js"),
     include_str!("page/editor.js"),
+    include_str!("page/serial.js"),
     include_str!("page/balance.js"),
     include_str!("page/lessons.js"),
+    include_str!("page/trust.js"),
     include_str!("page/desk.js"),
 ];
-
-/// Smallest size, at the price of time.
-const COMPRESSION: u8 = 10;
 
 /// A rig from which a person can start.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,13 +61,14 @@ pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
     let parts = [
         ("{policy}", policy),
         ("{style}", style),
+        ("{baud}", BAUD.to_string()),
         ("{examples}", embedded(&shown)),
         ("{lessons}", embedded(&lessons)),
         ("{worker}", embedded(&bare(WORKER))),
         ("{twin}", embedded(&twin.html)),
         ("{theme}", embedded(&page_theme())),
-        ("{motions}", base64(&compress_to_vec_zlib(&knots, COMPRESSION))),
-        ("{module}", base64(&compress_to_vec_zlib(module, COMPRESSION))),
+        ("{motions}", base64(&packed(&knots))),
+        ("{module}", base64(&packed(module))),
         ("{script}", script),
     ];
     let (mut page, mut rest) = (String::new(), PAGE);
@@ -83,7 +86,7 @@ pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
 fn shown(examples: &[Example]) -> (Vec<Value>, Vec<u8>) {
     let mut knots = Vec::new();
     let mut of = |example: &Example| {
-        let motions = example.motions.as_deref().and_then(packed).map(|(text, mut bytes)| {
+        let motions = example.motions.as_deref().and_then(without_knots).map(|(text, mut bytes)| {
             let from = knots.len();
             knots.append(&mut bytes);
             json!({ "text": text, "from": from })

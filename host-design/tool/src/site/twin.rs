@@ -4,8 +4,17 @@ use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::twin::assets::{ASSETS, Asset};
 
 /// The modules of its script, each after those that it imports.
-const MODULES: [&str; 8] =
-    ["colours.js", "link.js", "guide.js", "rig.js", "scope.js", "controls.js", "drawers.js", "main.js"];
+const MODULES: [&str; 9] = [
+    "colours.js",
+    "link.js",
+    "guide.js",
+    "history.js",
+    "rig.js",
+    "scope.js",
+    "controls.js",
+    "drawers.js",
+    "main.js",
+];
 
 /// The twin's page in one document.
 pub(super) struct TwinPage {

@@ -16,7 +16,7 @@ pub(crate) struct Asset {
 const SCRIPT: &str = "text/javascript";
 
 /// All files of the page.
-pub(crate) const ASSETS: [Asset; 11] = [
+pub(crate) const ASSETS: [Asset; 12] = [
     Asset { name: "", media_type: "text/html", content: include_str!("page/page.html") },
     Asset { name: "colours.css", media_type: "text/css", content: COLOURS_CSS },
     Asset { name: "page.css", media_type: "text/css", content: include_str!("page/page.css") },
@@ -24,6 +24,7 @@ pub(crate) const ASSETS: [Asset; 11] = [
     Asset { name: "colours.js", media_type: SCRIPT, content: include_str!("page/colours.js") },
     Asset { name: "link.js", media_type: SCRIPT, content: include_str!("page/link.js") },
     Asset { name: "guide.js", media_type: SCRIPT, content: include_str!("page/guide.js") },
+    Asset { name: "history.js", media_type: SCRIPT, content: include_str!("page/history.js") },
     Asset { name: "rig.js", media_type: SCRIPT, content: include_str!("page/rig.js") },
     Asset { name: "scope.js", media_type: SCRIPT, content: include_str!("page/scope.js") },
     Asset { name: "controls.js", media_type: SCRIPT, content: include_str!("page/controls.js") },

@@ -36,6 +36,8 @@ mod serial_errors;
 mod shaken;
 mod site_bits;
 mod site_page;
+mod site_serial;
+mod site_shown;
 mod site_twin;
 mod split_command;
 mod stepper_command;
@@ -43,6 +45,7 @@ mod transitions_command;
 mod twin_access;
 mod twin_guide;
 mod twin_page;
+mod twin_reload;
 mod verify_command;
 mod virtual_board;
 

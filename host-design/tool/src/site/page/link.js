@@ -2,13 +2,8 @@
 
 const embedded = (id) => document.getElementById(id).textContent;
 
-// What is embedded as base64 of compressed bytes.
-async function inflated(id) {
-  const text = atob(embedded(id).trim());
-  const packed = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
-  const bytes = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
-  return new Uint8Array(await new Response(bytes).arrayBuffer());
-}
+// What is embedded as base64 of packed bytes.
+const bytesOf = (id) => decoded(Uint8Array.from(atob(embedded(id).trim()), (letter) => letter.charCodeAt(0)));
 
 // A thread that computes. Of several questions that wait, only the last of each kind is asked.
 class Thread {
@@ -36,11 +31,11 @@ class Thread {
     this.next();
   }
 
-  // Runs a rig, for the page at the other end of the port.
-  run(rig, theme, port, take) {
+  // Runs a rig, or talks to the board at a line, for the page at the other end of the port.
+  run(rig, theme, port, line, take) {
     this.ready.then(() => {
       this.asked = { take };
-      this.worker.postMessage({ id: 'run', rig, theme }, [port]);
+      this.worker.postMessage({ id: 'run', rig, theme }, line === null ? [port] : [port, line]);
     });
   }
 

@@ -4,10 +4,10 @@ const BYTES = 9;
 const AS_IT_IS = 128;
 
 // The text of the file of stored motions of an example, or null.
-async function motionsOf({ motions }) {
+function motionsOf({ motions }) {
   if (motions === null) return null;
   const stored = JSON.parse(motions.text);
-  const bytes = (await inflated('motions')).subarray(motions.from);
+  const bytes = bytesOf('motions').subarray(motions.from);
   let from = 0;
   for (const name of ['raise', 'lower']) {
     const [rows, width] = stored[name].knots;

@@ -10,6 +10,7 @@ import { Drawers } from './drawers.js';
 
 const byId = (id) => document.getElementById(id);
 const MOTOR_MS = 150; // time between two texts of the motor's force
+const KEPT = 'upright scopes'; // name in the tab's store
 
 const seen = { you: null, picture: null, telemetry: null, frames: 0, step: 0, since: -MOTOR_MS };
 let hello = null;
@@ -31,6 +32,7 @@ const ask = connect({
     });
     controls.hello(hello, scopes);
     drawers.hello(hello);
+    remember();
   },
   picture(picture) {
     seen.picture = picture;
@@ -66,6 +68,22 @@ const wish = new Wish(ask);
 const witness = new Witness();
 const controls = new Controls(ask, wish);
 const drawers = new Drawers((what) => controls.machine(what));
+
+// A page that is loaded again shows the curves of the page before: the address is that of the same run. A run inside
+// a page ends with that page.
+function remember() {
+  if (location.protocol === 'about:') return;
+  let store = null;
+  try { store = sessionStorage; } catch { return; } // forbidden by the person
+  const kept = store.getItem(KEPT);
+  store.removeItem(KEPT);
+  const [address] = kept?.split(' ', 1) ?? [];
+  if (address === location.href) scopes.restore(kept.slice(address.length));
+  addEventListener('pagehide', () => {
+    // A store that is too small keeps nothing.
+    try { store.setItem(KEPT, `${location.href} ${scopes.kept()}`); } catch {}
+  });
+}
 
 // Frame and tag of the picture: whether the motor is on.
 function motor(latest, force) {

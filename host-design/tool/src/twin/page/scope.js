@@ -2,18 +2,15 @@
 
 import { colour, dash } from './colours.js';
 import { isEstimated, isHomed, isOn } from './guide.js';
+import { CAPACITY, ESTIMATED, History, UNKNOWN } from './history.js';
 import { context } from './rig.js';
 
-const CAPACITY = 1 << 14; // telemetry messages that are kept
 const LONGEST_S = 60;
 const SHORTEST_S = 0.2;
 const DEGREES = 180 / Math.PI;
 const MARGIN = { left: 52, right: 6, top: 6, bottom: 6 };
 const NARROW = matchMedia('(max-width: 50rem)');
 const AXIS_PX = 18;
-
-// What is known at a time: the estimate, only the true position, or nothing.
-const [ESTIMATED, SEEN, UNKNOWN] = [0, 1, 2];
 
 // The scopes: curves, each with its name, its value in a telemetry message, and its limit, beside the smallest range
 // that is shown and what is said where there is no value.
@@ -35,46 +32,6 @@ function panels(hello) {
     { title: 'Tick', unit: 'processor cycles', least: 10, curves: [
       { name: 'cycles', value: (t) => t.cycles, ink: '--ink' }, { name: 'worst', value: (t) => t.worst_cycles, ink: '--c1' }] },
   ].filter((panel) => panel.curves.length > 0);
-}
-
-// Telemetry in rings of a fixed size.
-class History {
-  constructor(curves) {
-    this.times = new Float64Array(CAPACITY);
-    this.values = curves.map(() => new Float32Array(CAPACITY));
-    this.seen = curves.map((curve) => (curve.seen === undefined ? null : new Float32Array(CAPACITY)));
-    this.known = new Uint8Array(CAPACITY);
-    this.curves = curves;
-    this.length = 0;
-  }
-
-  // `state` is the true one, or what the encoders say.
-  push(t, telemetry, state) {
-    const slot = this.length % CAPACITY;
-    this.times[slot] = t;
-    this.known[slot] = isEstimated(telemetry) ? ESTIMATED : state !== null ? SEEN : UNKNOWN;
-    this.curves.forEach((curve, i) => {
-      this.values[i][slot] = curve.value(telemetry) ?? NaN;
-      if (curve.seen !== undefined) this.seen[i][slot] = this.known[slot] === SEEN ? curve.seen(state) : NaN;
-    });
-    this.length += 1;
-  }
-
-  get first() { return Math.max(0, this.length - CAPACITY); }
-
-  time(index) { return this.times[index % CAPACITY]; }
-
-  get last() { return this.length > 0 ? this.time(this.length - 1) : 0; }
-
-  // Index of the first telemetry message at or after a time.
-  after(t) {
-    let [low, high] = [this.first, this.length];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.time(middle) < t) low = middle + 1; else high = middle;
-    }
-    return low;
-  }
 }
 
 export class Scopes {
@@ -162,6 +119,19 @@ export class Scopes {
       if (panel.element.hidden) panel.element.hidden = !panel.curves.some(({ value }) => Math.abs(value(telemetry)) > 0);
     }
     this.note(t, telemetry, machine?.pull ?? null);
+  }
+
+  // Text from which another page of the same rig shows the same curves.
+  kept() {
+    const { events, span, history, panels: all } = this;
+    return JSON.stringify({ events, span, hidden: all.map(({ element }) => element.hidden), history: history.kept() });
+  }
+
+  restore(text) {
+    const { events, span, hidden, history } = JSON.parse(text);
+    Object.assign(this, { events, span });
+    this.panels.forEach(({ element }, i) => { element.hidden = hidden[i]; });
+    this.history.restore(history);
   }
 
   // Events on the time axis: pulls with their largest force, and faults.
