@@ -152,7 +152,7 @@ fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
     let first_gain = "upright.desk.design.laws[0].continuous.k[0]";
     until(&mut browser, &format!("document.getElementById('problem').hidden && {first_gain} < 2"));
 
-    // A page that is loaded again has the rig as it was; for who prefers reduced motion, the run does not play by itself.
+    // A page that is loaded again has the rig as it was; with reduced motion, its run does not play by itself.
     until(&mut browser, "upright.desk.at > 0");
     browser.reduces_motion = true;
     let address = browser.value("location.href");
