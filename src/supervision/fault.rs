@@ -156,8 +156,8 @@ impl Fault {
             condition: "three measurements in a row of one encoder contradict the model: it jumps, is reversed, swapped or \
                         late; single ones are rejected and counted",
             reaction: Reaction::Ticks(3),
-            remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too; home, and check the signs \
-                     again",
+            remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too, and on a stepper the \
+                     drive in any case; home, and check the signs again",
         },
         Entry {
             fault: Fault::Frozen,
@@ -165,7 +165,8 @@ impl Fault {
             condition: "an encoder stands still while the model moves it by a seventh of its threshold per tick or more; slower \
                         motion is found later, long before a limit",
             reaction: Reaction::Ticks(10),
-            remedy: "check plug, wire and coupling of this encoder; home, and check the signs again",
+            remedy: "check plug, wire and coupling of this encoder, and on a stepper the drive; home, and check the signs \
+                     again",
         },
         Entry {
             fault: Fault::Motor,
@@ -173,7 +174,8 @@ impl Fault {
             condition: "the rig does not move as the motor's force should move it: motor dead, weak, stuck or reversed, or \
                         a collision; ticks count from when the missing motion is more than the encoders' steps hide",
             reaction: Reaction::Ticks(20),
-            remedy: "check motor, coupling and belt, and the masses in the rig file; keep hands off the cart",
+            remedy: "check motor, coupling and belt, and the masses in the rig file; on a stepper also its driver, current and \
+                     switches of the microsteps; keep hands off the cart",
         },
         Entry {
             fault: Fault::Saturated,

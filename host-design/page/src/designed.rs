@@ -10,6 +10,7 @@ use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, NoTable, TableValues};
 
 use crate::refusal::PageRefusal;
+use crate::trust::ShortTrust;
 
 /// Most points of a curve that a page draws.
 const POINTS: usize = 600;
@@ -30,6 +31,7 @@ pub(crate) struct ShownRun {
 pub(crate) struct DeskDesign {
     certified: Certified,
     table: Result<TableValues, NoTable>,
+    trust: ShortTrust,
 }
 
 impl DeskDesign {
@@ -37,7 +39,7 @@ impl DeskDesign {
     pub(crate) fn of(rig: &Rig) -> Result<Self, PageRefusal> {
         let certified = design(rig)?;
         let table = TableValues::of(rig, &certified, Gains::Sampled);
-        Ok(Self { certified, table })
+        Ok(Self { certified, table, trust: ShortTrust::default() })
     }
 
     /// The gain table.
@@ -85,6 +87,12 @@ impl DeskDesign {
             "no_table": self.table.as_ref().err().map(ToString::to_string),
             "laws": laws,
         }))
+    }
+
+    /// The trust report after the step of this number.
+    pub(crate) fn verify(&mut self, rig: &Rig, step: usize) -> Result<Value, PageRefusal> {
+        let table = self.table.as_ref().map_err(Clone::clone)?;
+        self.trust.step(rig, &self.certified, table, step)
     }
 
     /// The poles of the loops of all laws, in continuous time and at the tick.

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `question.rs`, `refusal.rs` | what a page asks, and why there may be no answer |
 //! | `sketch.rs`, `designed.rs` | what it shows of a rig, and of its design |
+//! | `trust.rs` | the trust report in short form, step by step |
 //! | `lesson.rs` | exercises, and how answers to them are marked |
 //! | `fingerprint.rs` | checksums of tables and of 100 000 ticks of the firmware, to compare machines |
 //! | `twin/` | a rig that a person can pull, change and break |
@@ -21,6 +22,7 @@ mod lesson;
 mod question;
 mod refusal;
 mod sketch;
+mod trust;
 pub mod twin;
 
 pub use fingerprint::{Fingerprint, FingerprintError, PullRounding, TICKS};

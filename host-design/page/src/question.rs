@@ -39,6 +39,8 @@ enum Asked {
     Design(ShownRun),
     /// The poles of the loops, which take as long as the gains.
     Poles,
+    /// The trust report in short form, as far as its step of this number.
+    Verify { step: usize },
     /// Whether this answer to an exercise is right.
     Mark { exercise: Exercise, answer: Vec<f64> },
     /// The gain table as Rust source, as `upright design` writes it.
@@ -79,6 +81,7 @@ impl Desk {
             }
             Asked::Design(run) => self.designed(&question.toml, &rig)?.gains_and_run(&rig, run),
             Asked::Poles => self.designed(&question.toml, &rig)?.poles(&rig),
+            &Asked::Verify { step } => self.designed(&question.toml, &rig)?.verify(&rig, step),
             Asked::Mark { exercise, answer } => exercise.marked(&question.toml, answer),
             Asked::Table => {
                 let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
@@ -96,13 +99,13 @@ impl Desk {
     }
 
     /// The design of `rig`, whose file has the text `toml`.
-    fn designed(&mut self, toml: &str, rig: &Rig) -> Result<&DeskDesign, PageRefusal> {
+    fn designed(&mut self, toml: &str, rig: &Rig) -> Result<&mut DeskDesign, PageRefusal> {
         let kept = self.designed.take().filter(|(text, _)| text == toml);
         let designed = match kept {
             Some((_, designed)) => designed,
             None => DeskDesign::of(rig)?,
         };
-        Ok(&self.designed.insert((toml.to_owned(), designed)).1)
+        Ok(&mut self.designed.insert((toml.to_owned(), designed)).1)
     }
 }
 

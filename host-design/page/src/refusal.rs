@@ -8,6 +8,7 @@ use upright_design::rig::{ForceOnly, RigError};
 use upright_design::simulate::SimulationError;
 use upright_design::swing_up::SwingUpError;
 use upright_design::table::NoTable;
+use upright_design::verify::VerifyError;
 
 use crate::fingerprint::FingerprintError;
 
@@ -27,6 +28,8 @@ pub(crate) enum PageRefusal {
     #[error(transparent)]
     Motions(#[from] SwingUpError),
     #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
     Fingerprint(#[from] FingerprintError),
@@ -36,6 +39,8 @@ pub(crate) enum PageRefusal {
     ForceOnly(#[from] ForceOnly),
     #[error("no rig is under power: start one")]
     NoTwin,
+    #[error("no board is connected: connect one")]
+    NoBoard,
     #[error("{0}")]
     Twin(String),
     #[error("give {0} numbers, with blanks between them")]

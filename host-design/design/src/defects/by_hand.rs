@@ -2,7 +2,7 @@
 
 use crate::harness::{Pins, Session};
 use crate::rig::Rig;
-use crate::simulate::Scenario;
+use crate::simulate::{Scenario, StepDefect};
 use crate::table::TableValues;
 use upright::board::Output;
 
@@ -10,7 +10,7 @@ use super::defect::{Defect, Needs};
 use super::expected::Expected;
 use super::expected::Phase;
 use super::injection::Injection;
-use super::trial::Trial;
+use super::trial::{Trial, first_encoder};
 
 /// A defect in a running rig, injected tick by tick.
 pub struct Defective<'a> {
@@ -46,12 +46,13 @@ impl Defect {
 
 impl Trial {
     /// A defect of medium severity that begins now.
-    pub fn by_hand(kind: Defect, scenario: &Scenario, sensors: usize, sensor: usize, seed: u64) -> Self {
+    pub fn by_hand(kind: Defect, scenario: &Scenario, table: &TableValues, sensor: usize, seed: u64) -> Self {
+        let (first, sensors) = (first_encoder(table), table.sensors());
         let sensor = match kind {
             Defect::CartEncoderFrozen => 0,
             Defect::LinkEncoderFrozen => sensor.clamp(1, sensors.max(2) - 1),
-            Defect::EncodersSwapped => sensor.min(sensors.saturating_sub(2)),
-            _ => sensor.min(sensors.saturating_sub(1)),
+            Defect::EncodersSwapped => sensor.min(sensors.saturating_sub(2)).max(first),
+            _ => sensor.min(sensors.saturating_sub(1)).max(first),
         };
         let sign = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
         Self {
@@ -103,10 +104,15 @@ impl<'a> Defective<'a> {
 
     /// Changes the output to the motor.
     pub fn output(&mut self, output: &mut Output) {
-        self.injection.output(output);
+        self.injection.output(self.since, output);
     }
 
-    /// External force on the cart (N).
+    /// What is wrong in this tick with a drive that takes pulses.
+    pub fn step_defect(&self) -> Option<StepDefect> {
+        self.injection.step_defect(self.since)
+    }
+
+    /// External force on the cart, or on the first link of a rig whose cart goes where its pulses say (N).
     pub fn push_n(&self) -> f64 {
         self.injection.push_n(self.since)
     }

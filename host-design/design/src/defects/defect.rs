@@ -109,6 +109,10 @@ defects! {
     RamBit Board "a bit of the firmware's variables or stack changes" => Bounded;
     WriteLost Board "a write to a register of the motor's timer is lost at power-up" => Refused(Inhibits::FAULT);
     EncoderWireOpen Nothing "a wire of an encoder is open: its count alternates between two values" => Off(10);
+    CartJammed Nothing "the cart of a stepper is stuck" => Off(20);
+    PulsesMissing Nothing "a stepper misses 50 to 95 % of its pulses" => Off(20);
+    SomePulsesMissing Nothing "a stepper misses 5 to 50 % of its pulses" => Bounded;
+    StepsLost Nothing "a stepper misses all pulses of 1 to 10 ticks, then follows again" => Bounded;
 }
 
 impl Defect {
@@ -151,6 +155,8 @@ impl Defect {
                 | Self::MotorReversed
                 | Self::MotorStuck
                 | Self::EncoderWireOpen
+                | Self::CartJammed
+                | Self::PulsesMissing
         )
     }
 }

@@ -92,7 +92,11 @@ impl Defect {
             | Defect::CrystalMissing
             | Defect::CrystalWrong
             | Defect::ChipWrong
-            | Defect::WriteLost => None,
+            | Defect::WriteLost
+            | Defect::CartJammed
+            | Defect::PulsesMissing
+            | Defect::SomePulsesMissing
+            | Defect::StepsLost => None,
             _ => Some(self.expected()),
         }
     }

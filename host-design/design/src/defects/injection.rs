@@ -14,7 +14,7 @@ use super::trial::Trial;
 use crate::client::command_frame;
 use crate::harness::{Pins, Session};
 use crate::rig::Rig;
-use crate::simulate::Bench;
+use crate::simulate::{Bench, StepDefect};
 use crate::table::{MAX_SENSORS, TableValues};
 
 /// Duration of a push on the cart (s).
@@ -40,11 +40,22 @@ pub struct Injection<'a> {
     thresholds: &'a Thresholds<MAX_SENSORS>,
     /// Error of each sensor above which the firmware's tests can detect it (counts).
     visible_counts: Vec<i64>,
-    /// Position and speed that the missing force would have given the cart (m, m/s).
+    /// Position and speed that the missing force or the missing pulses would have given the cart (m, m/s).
     missing: [f64; 2],
     full_force_n: f64,
     push_ticks: usize,
     supply_ticks: usize,
+}
+
+/// Largest force of a push (N): the motor's; on a rig whose cart goes where its pulses say, a twentieth of its links'
+/// weight.
+pub fn push_limit_n(rig: &Rig, table: &TableValues) -> f64 {
+    match rig.chain().filter(|_| table.steps.is_some()) {
+        Some(chain) => {
+            0.05 * chain.gravity_m_per_s2 * chain.links.iter().map(|link| link.mass_kg).sum::<f64>()
+        }
+        None => f64::from(table.force_limit_n),
+    }
 }
 
 impl<'a> Injection<'a> {
@@ -71,7 +82,7 @@ impl<'a> Injection<'a> {
             past: Vec::new(),
             visible_counts: (0..table.sensors()).map(visible).collect(),
             missing: [0.0; 2],
-            full_force_n: f64::from(table.force_limit_n),
+            full_force_n: push_limit_n(rig, table),
             push_ticks: ticks(PUSH_S),
             supply_ticks: table.limits.supply_ticks as usize,
         }
@@ -154,9 +165,12 @@ impl<'a> Injection<'a> {
         visible
     }
 
-    /// Changes the output to the motor; returns whether the effect by now differs visibly from a healthy rig.
-    pub fn output(&mut self, output: &mut Output) -> bool {
-        // The whole firmware gives no pulses.
+    /// Changes the output to the motor, `since` ticks after the onset; returns whether the effect by now differs
+    /// visibly from a healthy rig.
+    pub fn output(&mut self, since: usize, output: &mut Output) -> bool {
+        if let Drive::Steps(pulses) = output.drive {
+            return self.misses(pulses, since);
+        }
         let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive else { return false };
         let asked = *command;
         let full = if self.table.motor.is_some() { 1.0 } else { self.full_force_n as f32 };
@@ -179,7 +193,38 @@ impl<'a> Injection<'a> {
         self.missing[0].abs() > f64::from(self.thresholds.innovation[0])
     }
 
-    /// External force on the cart (N).
+    /// What is wrong, `since` ticks after the onset, with a drive that takes pulses.
+    pub fn step_defect(&self, since: usize) -> Option<StepDefect> {
+        let Trial { kind, size, .. } = self.trial;
+        self.table.steps?;
+        match kind {
+            Defect::MotorDead => Some(StepDefect::Off),
+            Defect::CartJammed => Some(StepDefect::Jammed),
+            // A step back for each one forward.
+            Defect::MotorReversed => Some(StepDefect::Misses(2.0)),
+            Defect::PulsesMissing => Some(StepDefect::Misses(0.5 + 0.45 * size)),
+            Defect::SomePulsesMissing => Some(StepDefect::Misses(0.05 + 0.45 * size)),
+            Defect::StepsLost if since < 1 + (10.0 * size) as usize => Some(StepDefect::Misses(1.0)),
+            _ => None,
+        }
+    }
+
+    /// Takes note of the pulses of a tick in which a drive is defective; returns whether the first link shows by now
+    /// that some are missing.
+    fn misses(&mut self, pulses: i32, since: usize) -> bool {
+        let share = match self.step_defect(since) {
+            None => 0.0,
+            Some(StepDefect::Off | StepDefect::Jammed) => 1.0,
+            Some(StepDefect::Misses(share)) => share,
+        };
+        let (Some(steps), Some(observer)) = (&self.table.steps, &self.table.observer) else { return false };
+        self.missing[0] += share * f64::from(pulses) * f64::from(steps.step_m);
+        // The link turns by this for each metre that the cart has gone (rad/m).
+        let turns = observer.bd.get(3).map_or(0.0, |&rate| f64::from(rate / self.table.tick_s));
+        (self.missing[0] * turns).abs() > f64::from(self.thresholds.innovation[1])
+    }
+
+    /// External force (N): on the cart, or on the first link of a rig whose cart goes where its pulses say.
     pub fn push_n(&self, since: usize) -> f64 {
         let pushes = self.trial.kind == Defect::Push && since < self.push_ticks;
         if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }

@@ -55,10 +55,21 @@ impl Defect {
         match self {
             Self::SupplySag | Self::SupplyDip => table.limits.supply_min_v > 0.0,
             Self::SupplySurge | Self::SupplySpike => table.motor.is_some(),
-            Self::LinkEncoderFrozen | Self::EncodersSwapped => table.sensors() > 1,
+            Self::LinkEncoderFrozen => table.sensors() > 1,
+            Self::EncodersSwapped => table.sensors() > 1 + first_encoder(table),
+            // The board counts the pulses that it gives.
+            Self::CartEncoderFrozen | Self::MotorStuck | Self::MotorWeak => table.steps.is_none(),
+            Self::CartJammed | Self::PulsesMissing | Self::SomePulsesMissing | Self::StepsLost => {
+                table.steps.is_some()
+            }
             _ => true,
         }
     }
+}
+
+/// Number of the first sensor that is an encoder: a drive with pulses has none at the cart.
+pub(super) fn first_encoder(table: &TableValues) -> usize {
+    usize::from(table.steps.is_some())
 }
 
 impl Trial {
@@ -90,12 +101,12 @@ impl Trial {
             counter_start: random.random(),
             ..Scenario::at_rest(rig, law)
         };
-        let sensors = table.sensors();
+        let (first, sensors) = (first_encoder(table), table.sensors());
         let sensor = match kind {
             Defect::CartEncoderFrozen => 0,
             Defect::LinkEncoderFrozen => random.random_range(1..sensors.max(2)),
-            Defect::EncodersSwapped => random.random_range(0..sensors.saturating_sub(1).max(1)),
-            _ => random.random_range(0..sensors),
+            Defect::EncodersSwapped => random.random_range(first..sensors.saturating_sub(1).max(first + 1)),
+            _ => random.random_range(first..sensors),
         };
         let trial = Self {
             number,

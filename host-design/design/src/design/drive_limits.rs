@@ -12,7 +12,7 @@ const RATIO: f64 = 1.03;
 
 /// The slowest drives with which the linear loop of the LQR, without integral action, is stable; the design does not
 /// know that they are slow.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct DriveLimits {
     /// Least resonance of a step motor with the cart (Hz).
     pub resonance_hz: f64,

@@ -126,6 +126,12 @@ impl Bench {
         self.missed = 0;
     }
 
+    /// Continues where `before` is, which simulates the same rig with other properties.
+    pub fn take_over(&mut self, before: &Self) {
+        self.hold(&before.state);
+        (self.pulses, self.missed) = (before.pulses, before.missed);
+    }
+
     /// Spoils a drive with pulses in the next tick.
     pub fn spoil(&mut self, defect: StepDefect) {
         self.step_defect = Some(defect);

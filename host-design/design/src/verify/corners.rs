@@ -7,7 +7,7 @@ use super::error::{VerifyError, chain, within};
 use super::trial::{Disturbance, Horizon, Outcome, disturbed, edge, leaning, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
-use crate::rig::Rig;
+use crate::rig::{CartInput, Rig};
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
@@ -53,7 +53,8 @@ impl core::fmt::Display for Mass {
 /// One combination of mass errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Corner {
-    /// For the cart and each link: +1 if the real mass is larger than in the rig file, -1 if smaller.
+    /// For the cart, unless its acceleration is imposed, and each link: +1 if the real mass is larger than in the rig
+    /// file, -1 if smaller.
     pub signs: Vec<i8>,
     /// The outcome of the run.
     pub outcome: Outcome,
@@ -64,7 +65,7 @@ pub struct Corner {
 pub struct Corners {
     /// Error of each mass (%).
     pub percent: f64,
-    /// Number of corners: 2^(n+1) for n links.
+    /// Number of corners: 2^(n+1) for n links, 2^n without the cart.
     pub corners: usize,
     /// Number of corners that survive.
     pub survived: usize,
@@ -81,14 +82,17 @@ pub(super) const MOST_LINKS: usize = 9;
 /// a default one follows the mass.
 pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
     let mut wrong = rig.clone();
-    if let Some(chain) = wrong.chain_mut() {
-        let masses =
-            chain.cart.mass_kg.iter_mut().chain(chain.links.iter_mut().map(|link| &mut link.mass_kg));
-        for (mass, factor) in masses.zip(factors) {
-            *mass *= 1.0 + 0.01 * percent * factor;
-        }
+    let change = |mass: &mut f64, factor: &f64| *mass *= 1.0 + 0.01 * percent * factor;
+    if let (Some(chain), Some((cart, links))) = (wrong.chain_mut(), factors.split_first()) {
+        chain.cart.mass_kg.iter_mut().for_each(|mass| change(mass, cart));
+        chain.links.iter_mut().zip(links).for_each(|(link, factor)| change(&mut link.mass_kg, factor));
     }
     wrong
+}
+
+/// The first part whose mass matters (0: cart): a drive that imposes the cart's acceleration does not feel its mass.
+fn first_mass(rig: &Rig) -> usize {
+    usize::from(rig.actuator.input() == CartInput::Acceleration)
 }
 
 fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {
@@ -112,20 +116,21 @@ pub fn corners(
     let links = chain(rig, "masses")?.links.len();
     within("percent", percent, 0.0..=90.0, "0 to 90 %")?;
     within("links", links as f64, 1.0..=MOST_LINKS as f64, "a chain of at most 9 links")?;
-    let scenario = run_of(rig, law, settings);
+    let (scenario, first) = (run_of(rig, law, settings), first_mass(rig));
     let signs = |mask: u32| -> Vec<i8> {
-        (0..=links).map(|part| if mask >> part & 1 == 1 { 1 } else { -1 }).collect()
+        (first..=links).map(|part| if mask >> (part - first) & 1 == 1 { 1 } else { -1 }).collect()
     };
     let batch = |masks: &[u32]| -> Result<Vec<Corner>, SimulationError> {
         let case = |&mask: &u32| {
-            let factors: Vec<f64> = signs(mask).into_iter().map(f64::from).collect();
+            let factors: Vec<f64> =
+                std::iter::repeat_n(0.0, first).chain(signs(mask).into_iter().map(f64::from)).collect();
             (wrong_masses(rig, percent, &factors), scenario.clone())
         };
         let outcomes = trials(table, &masks.iter().map(case).collect::<Vec<_>>(), &Horizon::default())?;
         let corner = |(&mask, outcome)| Corner { signs: signs(mask), outcome };
         Ok(masks.iter().zip(outcomes).map(corner).collect())
     };
-    let masks: Vec<u32> = (0..2u32 << links).collect();
+    let masks: Vec<u32> = (0..2u32 << (links - first)).collect();
     let all = parallel::try_map_in_batches(&masks, LANES, batch)?;
     let mut weakest = &all[0];
     for corner in &all {
@@ -208,14 +213,14 @@ pub fn mass_tolerances(
         Ok(found.map_or(0.0, |(percent, ())| percent))
     };
     let cases: Vec<(usize, f64, f64)> =
-        (0..parts).flat_map(|part| [(part, -1.0, 90.0), (part, 1.0, 900.0)]).collect();
+        (first_mass(rig)..parts).flat_map(|part| [(part, -1.0, 90.0), (part, 1.0, 900.0)]).collect();
     let found: Vec<f64> = parallel::try_map::<_, _, SimulationError>(cases, tolerated)?;
     let mass = |part: usize| if part == 0 { Mass::Cart } else { Mass::Link(part) };
     let mut tolerances: Vec<MassTolerance> = found
         .chunks_exact(2)
         .enumerate()
         .map(|(part, sides)| MassTolerance {
-            mass: mass(part),
+            mass: mass(first_mass(rig) + part),
             lighter_percent: sides[0],
             heavier_percent: sides[1],
         })

@@ -6,7 +6,7 @@ use super::VerifyError;
 use super::loop_model::LoopModel;
 use crate::design::{Certified, integrated_quadratic, noise_columns};
 use crate::numerics::Matrix;
-use crate::rig::Rig;
+use crate::rig::{CartInput, Rig};
 
 /// Root mean squares caused by one source, or by all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,17 +32,21 @@ pub(super) fn covariance(
 ) -> Result<Option<Vec<NoiseShare>>, VerifyError> {
     let Some(noise) = &rig.kalman else { return Ok(None) };
     let size = model.matrix.rows();
+    // The cart of a drive with pulses is where the observer takes it to be.
+    let has_force = rig.actuator.input() == CartInput::Force;
+    let entry = |state: usize| if has_force || state > 1 { state } else { model.states + state };
+    let first = usize::from(!has_force);
     let mut shares = Vec::new();
     let mut add = |source: String, q: &Matrix<f64>, direct: f64| -> Result<(), VerifyError> {
         let p = stationary(&model.matrix, q)?;
         let c = &model.force_output;
         let force = (&(c * &p) * &c.transpose())[(0, 0)] + direct;
-        let states = (0..model.states).map(|i| p[(i, i)].max(0.0).sqrt()).collect();
+        let states = (0..model.states).map(|state| p[(entry(state), entry(state))].max(0.0).sqrt()).collect();
         shares.push(NoiseShare { source, force_n: force.max(0.0).sqrt(), states });
         Ok(())
     };
     if let Some(kalman) = certified.double.kalman.as_ref().filter(|_| from_encoders) {
-        for (i, step) in kalman.steps.entries().iter().enumerate() {
+        for (i, step) in kalman.steps.entries().iter().enumerate().skip(first) {
             let variance = step * step / 12.0;
             let f = model.sensor_input.block(0, i, size, 1);
             let d = model.sensor_to_force[(0, i)];
@@ -55,7 +59,7 @@ pub(super) fn covariance(
     let force = real(rig.verify.force_rms_n, noise.force_noise_n2_s);
     let joints = noise.joint_noise.iter().map(|&expected| real(rig.verify.torque_rms_n_m, expected));
     let intensities = [force].into_iter().chain(joints);
-    for (i, intensity) in intensities.take(inputs.cols()).enumerate() {
+    for (i, intensity) in intensities.take(inputs.cols()).enumerate().skip(first) {
         let column = inputs.block(0, i, inputs.rows(), 1);
         let spread = (&column * &column.transpose()).scaled(&intensity);
         let q = integrated_quadratic(&certified.double.a.transpose(), &spread, &rig.tick.period_s);

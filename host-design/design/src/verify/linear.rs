@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use crate::design::Certified;
+use crate::design::{Certified, DriveLimits};
 use crate::numerics::{Complex, eigenvalues};
 use crate::rig::Rig;
 use crate::table::TableValues;
@@ -33,6 +33,9 @@ pub struct LinearReport {
     pub rounding: Option<Rounding>,
     /// Evidence for each gain; empty if the table's gains are not those designed for the tick.
     pub certificates: Vec<Certificate>,
+    /// How slow a drive may be that imposes the cart's acceleration, with the LQR.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveLimits>,
 }
 
 /// The linear half of the trust report, one for each law in the table.
@@ -48,16 +51,17 @@ pub fn linear(
     let mut reports = Vec::new();
     for law in Law::ALL {
         let Some(numbers) = loop_model::Numbers::<f64>::of_table(table, law) else { continue };
-        let model = LoopModel::with_numbers(certified, &numbers);
+        let seen = &loop_model::seen_plant(certified, &numbers);
+        let model = LoopModel::with_numbers(seen, &numbers);
         let (poles, spectral_radius) = poles(&model)?;
         let stable = spectral_radius < 1.0;
         let tick_s = rig.tick.period_s;
         let (mut margins, mut tick, mut noise) = (None, None, None);
         if stable {
             let grid = margins::Grid::of(&model)?;
-            margins = Some(margins::margins(certified, &numbers, &grid, tick_s)?);
-            tick = Some(tick::limits(certified, &numbers, &grid, tick_s)?);
-            noise = covariance::covariance(rig, certified, &model, table.observer.is_some())?;
+            margins = Some(margins::margins(seen, &numbers, &grid, tick_s)?);
+            tick = Some(tick::limits(seen, &numbers, &grid, tick_s)?);
+            noise = covariance::covariance(rig, seen, &model, table.observer.is_some())?;
         }
         let as_designed = loop_model::exact_law(certified, table, law)
             .is_some_and(|exact| certified.double.sampled.in_table()[law] == Some(exact));
@@ -70,6 +74,7 @@ pub fn linear(
             tick,
             noise,
             rounding: rounding::rounding(rig, certified, table, law, spectral_radius)?,
+            drive: (law == Law::Lqr).then(|| DriveLimits::of(rig, &certified.double)).flatten(),
             certificates: if as_designed { certificates.of_law(law) } else { Vec::new() },
         });
     }
@@ -87,14 +92,15 @@ pub fn margins_of(
     law: Law,
 ) -> Result<Option<Margins>, VerifyError> {
     let Some(numbers) = loop_model::Numbers::<f64>::of_table(table, law) else { return Ok(None) };
-    let model = LoopModel::with_numbers(certified, &numbers);
+    let seen = &loop_model::seen_plant(certified, &numbers);
+    let model = LoopModel::with_numbers(seen, &numbers);
     let (_, spectral_radius) = poles(&model)?;
     let stable = spectral_radius < 1.0;
     if !stable {
         return Ok(None);
     }
     let grid = margins::Grid::of(&model)?;
-    margins::margins(certified, &numbers, &grid, rig.tick.period_s).map(Some)
+    margins::margins(seen, &numbers, &grid, rig.tick.period_s).map(Some)
 }
 
 /// Poles of the loop as [re, im], sorted by real part, and the largest absolute value of one.

@@ -286,7 +286,8 @@ impl<R: Real> LoopModel<R> {
 
     /// The loop of the rig as it will run with the table's `law`; none if the table does not hold it.
     pub fn as_it_runs(certified: &Certified, table: &TableValues, law: Law) -> Option<Self> {
-        Some(Self::with_numbers(certified, &Numbers::of_table(table, law)?))
+        let numbers = Numbers::of_table(table, law)?;
+        Some(Self::with_numbers(&seen_plant(certified, &numbers), &numbers))
     }
 
     pub(super) fn with_numbers(certified: &Certified, numbers: &Numbers<R>) -> Self {
@@ -295,6 +296,29 @@ impl<R: Real> LoopModel<R> {
         let plant = PlantModel::held(&ad, &bd, numbers.delay_ticks, &numbers.measured);
         Self::of(&plant, &ControllerModel::of(numbers))
     }
+}
+
+/// The design with the plant that `numbers` control. An observer that does not correct by the first sensor takes the
+/// cart's position and speed from the commands alone: where the cart really is changes nothing in the loop, so that it
+/// must not look like two poles at 1. Its rows decay within a tick.
+pub(super) fn seen_plant<R: Real>(certified: &Certified, numbers: &Numbers<R>) -> Certified {
+    let mut seen = certified.clone();
+    let is_unseen = numbers.observer.as_ref().is_some_and(|observer| {
+        let column = observer.l.block(0, 0, observer.l.rows(), 1);
+        column.entries().iter().all(R::is_zero)
+    });
+    if !is_unseen {
+        return seen;
+    }
+    let (design, rate) = (&mut seen.double, -1.0 / numbers.tick_s.to_f64());
+    for cart in 0..2 {
+        for column in 0..design.a.cols() {
+            (design.a[(cart, column)], design.ad[(cart, column)]) = (0.0, 0.0);
+        }
+        design.a[(cart, cart)] = rate;
+        (design.b[(cart, 0)], design.bd[(cart, 0)]) = (0.0, 0.0);
+    }
+    seen
 }
 
 /// Largest absolute value of a pole of the loop.

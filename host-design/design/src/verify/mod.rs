@@ -30,6 +30,7 @@ mod linear;
 mod loop_model;
 mod margins;
 mod monte_carlo;
+mod needed_force;
 mod noise_runs;
 mod pushes;
 mod report;
@@ -59,7 +60,7 @@ pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
     Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, OfBristle, RequiredSurvival,
-    SizeRuns, Survival, imperfections, limit_cycle, required_imperfections, survival,
+    SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections, survival,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};

@@ -4,6 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use super::error::VerifyError;
+use super::needed_force::NeededForce;
 use super::trial::{Disturbance, Horizon, disturbed, trial};
 use crate::parallel;
 use crate::plant::absolute_angles;
@@ -32,6 +33,12 @@ pub struct MeasuredRipple {
     pub force_rms_n: f64,
     /// Largest force on the cart (N).
     pub force_peak_n: f64,
+    /// Largest force that a drive needed which imposes the acceleration of a cart of given mass (N).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub needed_force_n: Option<f64>,
+    /// Largest share of the force that the step motor of `[reality]` has at the speed of that moment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub needed_share: Option<f64>,
     /// Each state: position (m) and speed (m/s) of the cart, angle of each joint (rad) and its rate (rad/s).
     pub state_rms: Vec<f64>,
     /// Each link's angle from the vertical (rad); empty for a model.
@@ -40,11 +47,16 @@ pub struct MeasuredRipple {
     pub estimate_error_rms: Vec<f64>,
 }
 
+fn most(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    one.into_iter().chain(other).reduce(f64::max)
+}
+
 #[derive(Default)]
 struct Sums {
     ticks: f64,
     force: f64,
     peak: f64,
+    needed: (f64, Option<f64>),
     state: Vec<f64>,
     angle: Vec<f64>,
     error: Vec<f64>,
@@ -65,6 +77,7 @@ pub fn noise_run(
 ) -> Result<NoiseRun, VerifyError> {
     let states = rig.states();
     let links = rig.links();
+    let needed = NeededForce::of(rig);
     let one = |seed: u64| -> Result<Sums, SimulationError> {
         let mut sums = Sums {
             state: vec![0.0; states],
@@ -74,6 +87,10 @@ pub fn noise_run(
         };
         let fall = run(rig, table, &disturbed(rig, law, duration_s, disturbance, seed), &mut |sample| {
             sums.peak = sums.peak.max(sample.force.abs());
+            if let Some(needed) = &needed {
+                let (force_n, share) = needed.at(sample.force, sample.state);
+                sums.needed = (sums.needed.0.max(force_n), most(share, sums.needed.1));
+            }
             if sample.t < 0.1 * duration_s {
                 return;
             }
@@ -99,6 +116,10 @@ pub fn noise_run(
     let ripple = (!survived.is_empty()).then(|| MeasuredRipple {
         force_rms_n: rms(&|sums| sums.force),
         force_peak_n: survived.iter().map(|sums| sums.peak).fold(0.0, f64::max),
+        needed_force_n: needed
+            .is_some()
+            .then(|| survived.iter().map(|sums| sums.needed.0).fold(0.0, f64::max)),
+        needed_share: survived.iter().filter_map(|sums| sums.needed.1).reduce(f64::max),
         state_rms: (0..states).map(|i| rms(&|sums| sums.state[i])).collect(),
         angle_rms_rad: (0..links).map(|i| rms(&|sums| sums.angle[i])).collect(),
         estimate_error_rms: (0..states).map(|i| rms(&|sums| sums.error[i])).collect(),

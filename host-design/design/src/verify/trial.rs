@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
 use crate::plant::absolute_angles;
-use crate::rig::Rig;
+use crate::rig::{CartInput, Rig};
 use crate::simulate::{Fall, Job, Sample, Scenario, SimulationError, run, run_all};
 use crate::study::infinite_if_null;
 use crate::table::TableValues;
@@ -26,8 +26,10 @@ impl Disturbance {
     /// tick. All joints get the torque of the one with the most noise.
     pub fn of(rig: &Rig) -> Self {
         let rms = |intensity: f64| (intensity / rig.tick.period_s).sqrt();
+        // A drive that imposes the cart's acceleration expects no force.
+        let forces = f64::from(u8::from(rig.actuator.input() == CartInput::Force));
         let expected = rig.kalman.as_ref().map_or(Self::NONE, |kalman| Self {
-            force_n: rms(kalman.force_noise_n2_s),
+            force_n: forces * rms(kalman.force_noise_n2_s),
             torque_n_m: rms(kalman.joint_noise.iter().copied().fold(0.0, f64::max)),
         });
         Self {

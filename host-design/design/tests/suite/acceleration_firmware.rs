@@ -15,8 +15,9 @@ use upright_design::client::AnyTelemetry;
 use upright_design::harness::{Harness, RailEnds, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, StepDefect};
+use upright_design::verify::linear;
 
-use crate::published::{rig, table};
+use crate::published::{certified, rig, table};
 use crate::supervised::{balancing, cause, tick};
 
 const STEPPERS: [&str; 3] = ["single-stepper", "double-stepper", "quadruple-stepper"];
@@ -291,6 +292,33 @@ fn a_fault_of_the_rig_brings_the_cart_to_rest_and_a_fault_of_the_drive_cuts_it()
     let sum: i32 = pulses.iter().sum();
     assert!((4..=7).contains(&pulses.len()) && (15..35).contains(&sum.abs()), "{pulses:?}");
     assert!(pulses.windows(2).all(|pair| pair[0].abs() > pair[1].abs()), "{pulses:?}");
+}
+
+#[test]
+fn the_share_of_its_pulses_that_a_drive_may_miss_is_the_gain_margin() {
+    let rig = rig("quadruple-stepper");
+    let values = table(&rig);
+    let linear = linear(&rig, certified(&rig), &values).unwrap();
+    let lqr = linear.iter().find(|report| report.law == Law::Lqr).unwrap();
+    assert!(lqr.stable && lqr.spectral_radius > 0.9, "{}", lqr.spectral_radius);
+    let gain = lqr.margins.as_ref().unwrap().lowest_gain;
+    println!("spectral radius {}, lowest gain {gain}", lqr.spectral_radius);
+    let untested = values.without_tests();
+    let stands = |gain: f64| {
+        let scenario = Scenario { torque_noise_n_m: 1e-5, ..leaning(&rig) };
+        balancing(&rig, &untested, &scenario, |harness| {
+            (0..4000).all(|_| {
+                let inputs = harness.inputs();
+                let output = harness.session.tick(&inputs).unwrap();
+                harness.bench.spoil(StepDefect::Misses(1.0 - gain));
+                harness.bench.tick(output.drive);
+                harness.session.fault().is_none()
+            })
+        })
+        .unwrap()
+    };
+    assert!(stands(1.0) && stands(0.5 * (1.0 + gain)));
+    assert!(!stands(0.85 * gain), "negative control");
 }
 
 /// The fault of a balancing rig whose drive has a defect from 200 ticks on, or whose board then counts so many pulses

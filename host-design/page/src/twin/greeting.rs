@@ -43,6 +43,7 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "soft_m": table.limits.rail_m,
         "angle_limit_rad": table.limits.angle_rad,
         "force_limit_n": table.force_limit_n,
+        "input": if table.steps.is_some() { ["Acceleration", "m/s²"] } else { ["Force", "N"] },
         "step": table.observer.as_ref()
             .map(|observer| observer.step.iter().take(table.sensors()).copied().collect::<Vec<_>>()),
         "sensors": (0..table.sensors()).map(|sensor| words::joint(sensor as u8)).collect::<Vec<_>>(),
@@ -61,6 +62,7 @@ fn group(kind: Defect) -> &'static str {
     match kind {
         kind if kind.has_sensor() || kind == Defect::CartEncoderFrozen => "Encoders",
         Defect::MotorDead | Defect::MotorReversed | Defect::MotorStuck | Defect::MotorWeak => "Motor",
+        Defect::CartJammed | Defect::PulsesMissing | Defect::SomePulsesMissing | Defect::StepsLost => "Motor",
         Defect::SupplyNotANumber
         | Defect::SupplySag
         | Defect::SupplyDip

@@ -35,20 +35,24 @@ impl ManualHold {
     }
 
     /// The state in which the rig is held in the next tick; `None` if it is not. `state` is that of the rig now. While
-    /// the motor pushes the cart, the rig is let go, and held again afterwards.
-    pub(crate) fn tick(&mut self, status: &Status, state: &[f64]) -> Option<&[f64]> {
+    /// the motor pushes the cart, the rig is let go, and held again afterwards. A drive that takes pulses moves the
+    /// cart by `carried_m` while it is on, whatever the hand does.
+    pub(crate) fn tick(&mut self, status: &Status, state: &[f64], carried_m: Option<f64>) -> Option<&[f64]> {
         if status.state == State::Jogging {
             let how = std::mem::replace(&mut self.how, Holding::Free);
             self.take(how, state);
             return None;
         }
+        if self.how == Holding::Free {
+            return None;
+        }
+        self.rig.carry(carried_m.unwrap_or_default());
         match (self.how, status.signs) {
-            (Holding::Free, _) => return None,
             (Holding::Guided, Signs::Move(sensor)) => self.rig.turn(sensor),
-            (Holding::Hanging, _) => {
+            (Holding::Hanging, _) if carried_m.is_none() => {
                 self.rig.push_to(0.0);
             }
-            (Holding::Guided, _) => {
+            (Holding::Free | Holding::Hanging | Holding::Guided, _) => {
                 self.rig.push_to(self.rig.held()[0]);
             }
             (Holding::Upright, _) => {
@@ -67,6 +71,21 @@ mod tests {
     use upright::supervision::jog::MotorSign;
 
     #[test]
+    fn a_hand_moves_the_cart_only_while_a_drive_that_takes_pulses_is_off() {
+        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-stepper.toml")) else {
+            panic!("no such rig")
+        };
+        let calibrated =
+            Status { state: State::Calibrated, signs: Signs::Checked, motor: MotorSign::Unchecked };
+        let mut hold = ManualHold::new(&rig);
+        hold.take(Holding::Hanging, &[0.1, 0.0, 0.0, 0.0]);
+        let cart_m = |held: Option<&[f64]>| held.unwrap()[0];
+        assert!((cart_m(hold.tick(&calibrated, &[0.0; 4], Some(0.002))) - 0.102).abs() < 1e-12);
+        assert!((cart_m(hold.tick(&calibrated, &[0.0; 4], Some(0.0))) - 0.102).abs() < 1e-12);
+        assert!(cart_m(hold.tick(&calibrated, &[0.0; 4], None)) < 0.1, "the hand pushes it to the middle");
+    }
+
+    #[test]
     fn a_cart_that_the_motor_pushes_is_held_again_where_it_is() {
         let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")) else {
             panic!("no such rig")
@@ -76,10 +95,10 @@ mod tests {
         let mut hold = ManualHold::new(&rig);
         hold.take(Holding::Upright, &[0.2, 0.0, 0.0, 0.0]);
         let jogging = Status { state: State::Jogging, ..calibrated };
-        assert_eq!(hold.tick(&jogging, &[0.25, 0.3, 0.0, 0.1]), None);
-        assert_eq!(hold.tick(&calibrated, &[0.3; 4]), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
+        assert_eq!(hold.tick(&jogging, &[0.25, 0.3, 0.0, 0.1], None), None);
+        assert_eq!(hold.tick(&calibrated, &[0.3; 4], None), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
         // Negative control: a rig that is let go is not held.
         hold.take(Holding::Free, &[0.25, 0.0, 0.0, 0.0]);
-        assert_eq!(hold.tick(&calibrated, &[0.3; 4]), None);
+        assert_eq!(hold.tick(&calibrated, &[0.3; 4], None), None);
     }
 }

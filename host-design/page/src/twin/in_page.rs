@@ -10,6 +10,7 @@ use upright_design::harness::{HarnessError, endless_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
+use super::connected::{ConnectedBoard, Exchange};
 use super::console::Console;
 use super::greeting::{breakable, greeting};
 use super::property::Properties;
@@ -33,6 +34,10 @@ enum TwinQuestion {
     /// What the person asks for, then the ticks that are due after `passed_s` of real time, but at most `most_ticks`.
     /// A person who `is_silent` for too long is no longer in command.
     Run { asked: Vec<PageRequest>, passed_s: f64, most_ticks: u32, is_silent: bool },
+    /// Begins a conversation with the real board of this rig.
+    Connect { toml: String, motions: Option<String> },
+    /// Goes on with that conversation.
+    Exchange(Exchange),
 }
 
 /// The twin of a page; it answers questions in JSON with objects in JSON.
@@ -41,6 +46,7 @@ enum TwinQuestion {
 #[derive(Default)]
 pub struct InPage {
     twin: Option<Twin>,
+    board: Option<ConnectedBoard>,
 }
 
 struct Twin {
@@ -58,7 +64,8 @@ enum Power {
 }
 
 impl InPage {
-    /// Answers `start` with `hello`, and `run` with a `picture`. A question that cannot be answered gives `failed`.
+    /// Answers `start` and `connect` with `hello`, `run` and `exchange` with a `picture`. A question that cannot be
+    /// answered gives `failed`.
     pub fn answer(&mut self, question: &str) -> String {
         let answer = serde_json::from_str(question)
             .map_err(PageRefusal::from)
@@ -78,6 +85,15 @@ impl InPage {
                 let twin = self.twin.as_mut().ok_or(PageRefusal::NoTwin)?;
                 Ok(twin.run(asked, [passed_s, f64::from(most_ticks)], is_silent))
             }
+            TwinQuestion::Connect { toml, motions } => {
+                let (board, told) = ConnectedBoard::of(&toml, motions.as_deref())?;
+                self.board = Some(board);
+                Ok(told)
+            }
+            TwinQuestion::Exchange(exchange) => {
+                let board = self.board.as_mut().ok_or(PageRefusal::NoBoard)?;
+                Ok(board.exchange(exchange))
+            }
         }
     }
 }
@@ -90,7 +106,6 @@ impl Twin {
         since_1970_s: f64,
     ) -> Result<Self, PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
-        rig.refuse_acceleration("twin")?;
         let table = DeskDesign::of(&rig)?.table_with(&rig, motions)?;
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, law) };
@@ -213,29 +228,100 @@ fn powered(
 mod tests {
     use super::*;
 
+    /// A page with its twin.
+    #[derive(Default)]
+    struct Page(InPage);
+
+    impl Page {
+        fn ask(&mut self, question: &Value) -> Value {
+            serde_json::from_str(&self.0.answer(&question.to_string())).unwrap()
+        }
+
+        fn start(&mut self, rig: &str, upright: bool) -> Value {
+            let file = format!("{}/../../rigs/{rig}.toml", env!("CARGO_MANIFEST_DIR"));
+            let toml = std::fs::read_to_string(file).unwrap();
+            let start = json!({ "twin": "start", "toml": toml, "upright": upright, "since_1970_s": 1.7e9 });
+            self.ask(&start)["hello"].clone()
+        }
+
+        /// Runs a second after these requests.
+        fn run(&mut self, asked: &[Value]) -> Value {
+            let run = json!({ "twin": "run", "asked": asked, "passed_s": 1.0, "most_ticks": 10_000, "is_silent": false });
+            self.ask(&run)
+        }
+
+        /// Does this with the machine, and returns the state a second later.
+        fn state_after(&mut self, what: &Value) -> Value {
+            let answer = self.run(&[json!({ "ask": "machine", "what": what })]);
+            last_state(&answer)
+        }
+    }
+
+    fn last_state(answer: &Value) -> Value {
+        answer["picture"]["telemetry"].as_array().unwrap().last().unwrap()["state"].clone()
+    }
+
+    fn defect(name: &str) -> Value {
+        json!({ "do": "defect", "name": name, "sensor": 0 })
+    }
+
     #[test]
     fn a_rig_that_was_broken_balances_again_after_the_power_was_switched_off_and_on() {
-        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../rigs/single-quanser-ip02.toml");
-        let toml = std::fs::read_to_string(file).unwrap();
-        let mut twin = InPage::default();
-        let mut ask =
-            |question: Value| -> Value { serde_json::from_str(&twin.answer(&question.to_string())).unwrap() };
-        let run = |what: Option<Value>| {
-            let asked: Vec<Value> =
-                what.iter().map(|what| json!({ "ask": "machine", "what": what })).collect();
-            json!({ "twin": "run", "asked": asked, "passed_s": 1.0, "most_ticks": 10_000, "is_silent": false })
-        };
+        let mut page = Page::default();
         // Negative control: without a rig, there is nothing to run.
-        assert!(ask(run(None))["failed"]["why"].as_str().unwrap().contains("no rig"));
-        let start = json!({ "twin": "start", "toml": toml, "upright": true, "since_1970_s": 1.7e9 });
-        assert_eq!(ask(start)["hello"]["rig"], "single-quanser-ip02");
-        let last = |answer: Value| {
-            answer["picture"]["telemetry"].as_array().unwrap().last().unwrap()["state"].clone()
-        };
-        assert_eq!(last(ask(run(None))), "Balancing");
-        let broken = json!({ "do": "defect", "name": "motor-reversed", "sensor": 0 });
-        assert_eq!(last(ask(run(Some(broken)))), "Fault");
-        ask(run(Some(json!({ "do": "restart", "upright": true }))));
-        assert_eq!(last(ask(run(None))), "Balancing");
+        assert!(page.run(&[])["failed"]["why"].as_str().unwrap().contains("no rig"));
+        assert_eq!(page.start("single-quanser-ip02", true)["rig"], "single-quanser-ip02");
+        assert_eq!(last_state(&page.run(&[])), "Balancing");
+        assert_eq!(page.state_after(&defect("motor-reversed")), "Fault");
+        page.run(&[json!({ "ask": "machine", "what": { "do": "restart", "upright": true } })]);
+        assert_eq!(last_state(&page.run(&[])), "Balancing");
+    }
+
+    #[test]
+    fn a_stepper_balances_and_is_pushed_and_broken() {
+        for rig in ["single-stepper", "double-stepper", "quadruple-stepper"] {
+            let mut page = Page::default();
+            let hello = page.start(rig, true);
+            let defects: Vec<_> =
+                hello["defects"].as_array().unwrap().iter().map(|told| &told["name"]).collect();
+            assert!(defects.iter().any(|&name| name == "cart-jammed"), "{defects:?}");
+            assert!(!defects.iter().any(|&name| name == "motor-stuck"), "{defects:?}");
+            for (name, value) in [("tilt", 0.1), ("mass", 3.0)] {
+                let set = json!({ "do": "set", "name": name, "value": value });
+                assert_eq!(page.state_after(&set), "Balancing", "{rig} {name}");
+            }
+            assert_eq!(page.state_after(&json!({ "do": "challenge", "on": true })), "Balancing");
+            for _ in 0..10 {
+                page.run(&[]);
+            }
+            let score = page.run(&[])["picture"]["machine"]["challenge"].clone();
+            println!("{rig}: {score}");
+            assert!(score["survived_n"].as_f64().unwrap() > 0.0, "{score}");
+            for name in ["motor-dead", "motor-reversed", "cart-jammed", "pulses-missing"] {
+                page.run(&[json!({ "ask": "machine", "what": { "do": "restart", "upright": true } })]);
+                assert_eq!(last_state(&page.run(&[])), "Balancing", "{rig}");
+                let mut state = page.state_after(&defect(name));
+                for _ in 0..3 {
+                    state = last_state(&page.run(&[]));
+                }
+                assert_eq!(state, "Fault", "{rig} {name}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_drive_that_only_holds_the_cart_survives_no_challenge() {
+        let mut page = Page::default();
+        page.start("single-stepper", false);
+        page.run(&[]);
+        let home = json!({ "ask": "say", "line": "home" });
+        assert_eq!(last_state(&page.run(&[home])), "Calibrated", "the drive holds the cart");
+        page.state_after(&json!({ "do": "challenge", "on": true }));
+        let score = page.run(&[])["picture"]["machine"]["challenge"].clone();
+        assert_eq!(
+            (score["is_over"].as_bool(), score["upright_s"].as_f64()),
+            (Some(true), Some(0.0)),
+            "{score}"
+        );
     }
 }

@@ -6,8 +6,10 @@
 //! | `request.rs`, `greeting.rs`, `console.rs` | what a page asks for, what it is told first, and what it is shown |
 //! | `simulated.rs` | the simulated machine, with `pull.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
 //! | `in_page.rs` | the twin of one page, in the page itself |
+//! | `connected.rs` | a real board, whose serial line the page has opened |
 
 mod challenge;
+mod connected;
 mod console;
 mod greeting;
 mod holding;

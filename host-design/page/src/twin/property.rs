@@ -54,23 +54,37 @@ const PROPERTIES: [Property; 13] = {
     ]
 };
 
+/// Whether a property changes how `rig` moves. The cart of a drive that takes pulses goes where they say; forces on it
+/// matter only if `[reality]` has the motor.
+fn acts(name: &str, rig: &Rig) -> bool {
+    let takes_pulses = rig.actuator.acceleration.is_some();
+    match name {
+        "force" | "jitter" | "delay" => !takes_pulses,
+        "cart-mass" | "cart-dry" | "cart-viscous" | "force-noise" => {
+            !takes_pulses || rig.reality.step_motor.holding_force_n.is_some()
+        }
+        _ => true,
+    }
+}
+
 /// The properties of a machine, and their current values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Properties {
-    all: [Property; PROPERTIES.len()],
-    values: [f64; PROPERTIES.len()],
+    all: Vec<Property>,
+    values: Vec<f64>,
 }
 
 impl Properties {
     /// The properties of `rig` as designed for, with the disturbances that its file expects.
     pub fn of(rig: &Rig) -> Self {
-        let mut all = PROPERTIES;
+        let mut all: Vec<_> =
+            PROPERTIES.iter().copied().filter(|property| acts(property.name, rig)).collect();
         for property in &mut all {
             if property.name == "force-noise" {
                 property.nominal = Disturbance::of(rig).force_n;
             }
         }
-        Self { values: all.map(|property| property.nominal), all }
+        Self { values: all.iter().map(|property| property.nominal).collect(), all }
     }
 
     /// All properties, as the page is told.
@@ -94,7 +108,7 @@ impl Properties {
 
     /// Names and values.
     pub(crate) fn all(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        self.all.iter().map(|property| property.name).zip(self.values)
+        self.all.iter().map(|property| property.name).zip(self.values.iter().copied())
     }
 
     /// The rig as it truly is: its file with these values in `[reality]`, and more viscous friction.

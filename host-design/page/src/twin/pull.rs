@@ -90,6 +90,13 @@ impl Spring {
         Pull { force_n, cart_n: force_n[0], torques_n_m: torques_of_force(&arms_m, force_n, state) }
     }
 
+    /// The torques at the joints (N·m) of a force along the rail (N) at the end of the first link.
+    pub(crate) fn torques_at_first(&self, force_n: f64, state: &[f64]) -> Vec<f64> {
+        let mut arms_m = vec![0.0; self.lengths_m.len()];
+        arms_m.iter_mut().zip(&self.lengths_m).take(1).for_each(|(arm, &length)| *arm = length);
+        torques_of_force(&arms_m, [force_n, 0.0], state)
+    }
+
     fn omega(&self) -> f64 {
         OMEGA / (self.lengths_m.len().max(1) as f64).powf(SOFTER)
     }

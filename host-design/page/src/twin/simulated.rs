@@ -6,10 +6,10 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright_design::defects::{Defect, Defective, Trial};
+use upright_design::defects::{Defect, Defective, Trial, push_limit_n};
 use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Target};
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::simulate::{Bench, Scenario};
+use upright_design::simulate::{Bench, Scenario, StepDefect};
 use upright_design::table::TableValues;
 use upright_design::verify::Disturbance;
 
@@ -56,6 +56,8 @@ pub struct World<'a, 't> {
     t_s: f64,
     epoch: Duration,
     restart: Option<bool>,
+    /// Travel per pulse (m) of a drive that takes them.
+    pulse_m: Option<f64>,
 }
 
 impl<'a, 't> World<'a, 't> {
@@ -104,6 +106,7 @@ impl<'a, 't> World<'a, 't> {
             t_s: 0.0,
             epoch,
             restart: None,
+            pulse_m: rig.actuator.acceleration.as_ref().map(|drive| drive.step_m),
         };
         world.rebuild()?;
         Ok(world)
@@ -160,9 +163,9 @@ impl<'a, 't> World<'a, 't> {
             torque_noise_n_m: Disturbance::of(self.machine.rig).torque_n_m,
             ..self.machine.scenario.clone()
         };
-        let state = self.harness.bench.state().to_vec();
-        self.harness.bench = Bench::new(&rig, &scenario)?;
-        self.harness.bench.hold(&state);
+        let mut bench = Bench::new(&rig, &scenario)?;
+        bench.take_over(&self.harness.bench);
+        self.harness.bench = bench;
         Ok(())
     }
 
@@ -187,7 +190,7 @@ impl<'a, 't> World<'a, 't> {
             MachineRequest::Pause { on } => self.pace.pause(on),
             MachineRequest::Step { ticks } => self.pace.step(ticks),
             MachineRequest::Challenge { on } => {
-                let limit_n = f64::from(self.machine.table.force_limit_n);
+                let limit_n = push_limit_n(self.machine.rig, self.machine.table);
                 self.challenge = on.then(|| Challenge::new(limit_n, self.t_s.to_bits()));
             }
             MachineRequest::Restart { upright } => self.restart = Some(upright),
@@ -204,7 +207,7 @@ impl<'a, 't> World<'a, 't> {
             return console.monitor.note(format!("`{name}` is no defect"));
         };
         let SimulatedMachine { rig, table, scenario } = self.machine;
-        let trial = Trial::by_hand(kind, scenario, table.sensors(), sensor, self.t_s.to_bits());
+        let trial = Trial::by_hand(kind, scenario, table, sensor, self.t_s.to_bits());
         let mut defect = Defective::new(rig, table, trial);
         // The conversation numbers its commands by the time.
         self.harness.session.count_from(self.now().as_micros() as u64);
@@ -249,7 +252,10 @@ impl<'a, 't> World<'a, 't> {
         let output = self.delayed.front().copied().unwrap_or(Output::OFF);
         let push_n = self.pushes();
         let status = self.harness.session.status();
-        if let Some(held) = self.hold.tick(&status, self.harness.bench.state()) {
+        let carried_m = self.pulse_m.map(|pulse_m| pulse_m * f64::from(output.pulses()));
+        if let Some(held) =
+            self.hold.tick(&status, self.harness.bench.state(), carried_m.filter(|_| output.enable))
+        {
             let held = held.to_vec();
             self.pull = None;
             return self.harness.bench.hold(&held);
@@ -258,19 +264,35 @@ impl<'a, 't> World<'a, 't> {
         self.pull =
             self.pulled.as_ref().zip(self.spring.as_ref()).map(|(pulled, spring)| spring.pull(pulled, state));
         let stop_n = self.end_stop_n(state);
-        let (cart_n, torques) = match &self.pull {
-            Some(pull) => (pull.cart_n, pull.torques_n_m.as_slice()),
-            None => (0.0, [].as_slice()),
+        let (cart_n, mut torques) = match &self.pull {
+            Some(pull) => (pull.cart_n, pull.torques_n_m.clone()),
+            None => (0.0, Vec::new()),
         };
-        self.harness.bench.pull(push_n + stop_n + cart_n, torques);
+        let is_at_stop = carried_m.is_some_and(|carried_m| stop_n * carried_m < 0.0);
+        if let (Some(_), Some(spring)) = (self.pulse_m, &self.spring) {
+            // The cart goes where its pulses say, whatever pushes it.
+            let pushed = spring.torques_at_first(push_n, state);
+            torques.resize(pushed.len(), 0.0);
+            torques.iter_mut().zip(pushed).for_each(|(torque, pushed)| *torque += pushed);
+        }
+        self.harness.bench.pull(push_n + stop_n + cart_n, &torques);
+        if let Some(defect) = self.defect.as_ref().and_then(Defective::step_defect) {
+            self.harness.bench.spoil(defect);
+        }
+        if is_at_stop {
+            self.harness.bench.spoil(StepDefect::Jammed);
+        }
         // A motor that is off turns freely.
         let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
         self.harness.bench.tick(drive);
     }
 
-    /// Pushes of the defect and of the challenge on the cart (N).
+    /// Pushes of the defect and of the challenge (N): on the cart, or on the first link of a rig whose cart goes where
+    /// its pulses say.
     fn pushes(&mut self) -> f64 {
-        let survives = self.output.enable;
+        // A drive that takes pulses is on while it only holds the cart, too.
+        let controls = self.pulse_m.is_none() || self.harness.session.status().state.controls();
+        let survives = self.output.enable && controls;
         let challenge = self.challenge.as_mut();
         let defect = self.defect.as_ref().map_or(0.0, Defective::push_n);
         defect + challenge.map_or(0.0, |challenge| challenge.tick(survives, self.machine.rig.tick.period_s))

@@ -88,6 +88,19 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     Ok(observed)
 }
 
+/// Changes what the motor does, `since` ticks after the onset; returns whether the rig shows it by now.
+fn spoil(
+    harness: &mut Harness<'_>,
+    injection: &mut Injection<'_>,
+    since: usize,
+    acting: &mut Output,
+) -> bool {
+    if let Some(defect) = injection.step_defect(since) {
+        harness.bench.spoil(defect);
+    }
+    injection.output(since, acting)
+}
+
 /// The limits of angles and rates while the rig is shaken are not in the table, so the angles per count are made
 /// smaller.
 fn blind_while_shaken(table: &mut TableValues) {
@@ -164,14 +177,13 @@ impl DefectRun<'_> {
                 injection.serial(&mut harness.session);
                 is_visible |= trial.kind == Defect::TableBit;
             }
-            observed.output(tick, output);
+            let (is_on, stops) = (self.is_on(&harness.session, &output), self.stops(&harness.session));
+            observed.output(tick, output, is_on, stops);
             if observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
                 observed.fault = harness.session.fault();
             }
             let mut acting = output;
-            if since.is_some() {
-                is_visible |= injection.output(&mut acting);
-            }
+            is_visible |= since.is_some_and(|since| spoil(harness, &mut injection, since, &mut acting));
             if is_visible {
                 observed.visible.get_or_insert(tick);
             }
@@ -190,6 +202,17 @@ impl DefectRun<'_> {
             }
         }
         Ok(observed)
+    }
+
+    /// Whether the motor is on: a drive that takes pulses is, too, while it only holds the cart and while it brings it
+    /// to rest after a fault, and then counts as off.
+    fn is_on(&self, session: &Session<'_>, output: &Output) -> bool {
+        output.enable && !self.stops(session)
+    }
+
+    /// Whether telemetry says that a drive with pulses has stopped following the control law.
+    fn stops(&self, session: &Session<'_>) -> bool {
+        self.table.steps.is_some() && !session.status().state.controls()
     }
 
     /// Pushes the rig in the next tick, `since` ticks after the onset: by hand, or at the cart alone.
@@ -373,7 +396,8 @@ impl DefectRun<'_> {
         if matches!(self.trial.kind, Defect::ArmStopped | Defect::ArmHeld) {
             let mut inputs = harness.inputs();
             inputs.contacts.emergency_stop = true;
-            observed.on_again |= harness.session.tick(&inputs)?.enable;
+            let output = harness.session.tick(&inputs)?;
+            observed.on_again |= self.is_on(&harness.session, &output);
             stopped = self.trial.kind == Defect::ArmStopped;
         }
         let mut inputs = harness.inputs();
@@ -391,7 +415,8 @@ impl DefectRun<'_> {
             Ok(_) => (),
         }
         for _ in 0..TICKS_AFTER {
-            observed.on_again |= harness.session.tick(&inputs)?.enable;
+            let output = harness.session.tick(&inputs)?;
+            observed.on_again |= self.is_on(&harness.session, &output);
         }
         Ok(observed)
     }

@@ -48,8 +48,8 @@ impl DefectRun<'_> {
             };
             if is_there_before && output.enable {
                 let mut acting = output;
-                if since.is_some() {
-                    injection.output(&mut acting);
+                if let Some(since) = since {
+                    injection.output(since, &mut acting);
                 }
                 harness.bench.tick(acting.drive);
                 held[0] = harness.bench.state()[0];
@@ -62,7 +62,7 @@ impl DefectRun<'_> {
                 }
                 continue;
             };
-            observed.output(tick, output);
+            observed.output(tick, output, output.enable, false);
             observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = harness.session.fault();

@@ -33,12 +33,13 @@ pub(super) struct Observed {
 }
 
 impl Observed {
-    /// Records the firmware's output in `tick`.
-    pub(super) fn output(&mut self, tick: usize, output: Output) {
+    /// Records the firmware's output in `tick`, and whether the motor is on; `was_told` if telemetry says that it went
+    /// off in the tick before.
+    pub(super) fn output(&mut self, tick: usize, output: Output, is_on: bool, was_told: bool) {
         self.outputs.push(output);
-        self.on_again |= output.enable && self.off.is_some();
-        if !output.enable {
-            self.off.get_or_insert(tick);
+        self.on_again |= is_on && self.off.is_some();
+        if !is_on {
+            self.off.get_or_insert(tick.saturating_sub(usize::from(was_told)));
         }
     }
 

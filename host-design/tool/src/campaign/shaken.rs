@@ -72,7 +72,7 @@ impl DefectRun<'_> {
                 }
                 output => output?,
             };
-            observed.output(tick, output);
+            observed.output(tick, output, output.enable, false);
             observed.outside |= observed.off.is_none() && self.is_out_of_bounds(shaken.harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = shaken.harness.session.fault();
@@ -95,8 +95,8 @@ impl DefectRun<'_> {
     /// The drive that acts on the cart, which the defect may change.
     fn acting(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
         let mut acting = upright::board::Output::on(drive, self.table.force_limit_n);
-        if since.is_some() {
-            injection.output(&mut acting);
+        if let Some(since) = since {
+            injection.output(since, &mut acting);
         }
         acting.drive
     }

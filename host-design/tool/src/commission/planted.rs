@@ -165,7 +165,7 @@ pub(super) struct DefectWires<'a> {
 impl<'a> DefectWires<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, scenario: &Scenario, planted: Planted) -> Self {
         let of_kind = |kind: Defect| {
-            let trial = Trial::by_hand(kind, scenario, table.sensors(), planted.sensor, scenario.seed);
+            let trial = Trial::by_hand(kind, scenario, table, planted.sensor, scenario.seed);
             Defective::new(rig, table, trial)
         };
         let defective = match planted.what {

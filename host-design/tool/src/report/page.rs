@@ -13,7 +13,7 @@ use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
 use super::{ReportError, ReportSource};
 use crate::figure::{COLOURS_CSS, style_sheet};
 use upright_design::design::{DesignPoles, Feedback};
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::{CartInput, PlantDescription, Rig};
 use upright_design::verify::{Certificate, Disturbance};
 
 /// Digits of A and B.
@@ -29,6 +29,8 @@ pub(super) struct ReportPage<'a> {
     delay_ticks: u8,
     is_chain: bool,
     is_disturbed: bool,
+    /// Name, symbol and unit of the plant's input.
+    input: &'static str,
     failed: usize,
     checks: Vec<CheckRow>,
     description: String,
@@ -117,6 +119,10 @@ impl<'a> ReportPage<'a> {
             delay_ticks: rig.tick.delay_ticks,
             is_chain: rig.chain().is_some(),
             is_disturbed: Disturbance::of(rig) != Disturbance::NONE,
+            input: match rig.actuator.input() {
+                CartInput::Force => "force u (N)",
+                CartInput::Acceleration => "acceleration u (m/s²)",
+            },
             failed: checks.iter().filter(|check| !check.holds).count(),
             checks,
             description: rig.describe(),
@@ -179,7 +185,11 @@ impl RunOutcome {
         if !summary.peak_angles_rad.is_empty() {
             parts.push(format!("largest angle {}°", number(degrees)));
         }
-        let (what, unit) = if summary.peak_angles_rad.is_empty() { ("input", "") } else { ("force", " N") };
+        let (what, unit) = match summary.input {
+            _ if summary.peak_angles_rad.is_empty() => ("input", ""),
+            CartInput::Force => ("force", " N"),
+            CartInput::Acceleration => ("acceleration", " m/s²"),
+        };
         parts.push(format!("largest {what} {}{unit}", number(summary.peak_force_n)));
         Self { law: run.law.title(), survives: summary.survives(), text: parts.join(", ") }
     }

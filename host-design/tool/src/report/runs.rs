@@ -5,7 +5,7 @@ use upright::table::Law;
 use super::number::number;
 use upright_design::design::DesignPoles;
 use upright_design::number::rounded;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::{CartInput, PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Sensing, SimulationError, Summary, Trace, simulate};
 use upright_design::swing_up::Demonstration;
 use upright_design::table::TableValues;
@@ -45,7 +45,7 @@ pub(super) fn scenes(
     seed: u64,
 ) -> Result<Vec<Scene>, SimulationError> {
     let base = Scenario {
-        sensing: Sensing::FullState,
+        sensing: if rig.actuator.acceleration.is_some() { Sensing::Encoders } else { Sensing::FullState },
         duration_s: duration(rig, poles),
         seed,
         substeps: 4,
@@ -125,12 +125,22 @@ fn unit(rig: &Rig) -> &'static str {
     if is_chain(rig) { " m" } else { "" }
 }
 
+/// What the controller measures in the runs that are not as on the bench. A drive with pulses knows only those of the
+/// cart.
+fn measured(rig: &Rig) -> &'static str {
+    match rig.actuator.input() {
+        CartInput::Force => "the whole state is measured",
+        CartInput::Acceleration => "only the angles of the links are measured",
+    }
+}
+
 fn step_plan(rig: &Rig, scenario: Scenario) -> ScenePlan {
     let text = format!(
-        "Set-point moved by {}{} at 0 s{}; the whole state is measured{}.",
+        "Set-point moved by {}{} at 0 s{}; {}{}.",
         number(scenario.step_m),
         unit(rig),
         if is_chain(rig) { ", made into a ramp by the governor" } else { "" },
+        measured(rig),
         of_model(rig)
     );
     ScenePlan { id: "step", name: "Step", text, scenario }
@@ -152,16 +162,17 @@ fn tilt_plan(rig: &Rig, trust: &TrustReport, mut scenario: Scenario) -> ScenePla
     }
     let text = format!(
         "Link 1 starts at {} rad ({}°) from the vertical, half of what the weaker law recovers from, all others vertical; \
-         the whole state is measured.",
+         {}.",
         number(angle),
-        number(angle.to_degrees())
+        number(angle.to_degrees()),
+        measured(rig)
     );
     ScenePlan { id: "tilt", name: "Tilt", text, scenario }
 }
 
 fn disturbed_plan(rig: &Rig, scenario: &Scenario) -> ScenePlan {
     let (noise, model) = (noise_text(rig, scenario.seed), of_model(rig));
-    let text = format!("At rest, disturbed by {noise}; the whole state is measured{model}.");
+    let text = format!("At rest, disturbed by {noise}; {}{model}.", measured(rig));
     ScenePlan { id: "disturbances", name: "Disturbances", text, scenario: disturbed(rig, scenario) }
 }
 
@@ -186,11 +197,14 @@ fn disturbed(rig: &Rig, scenario: &Scenario) -> Scenario {
 
 fn noise_text(rig: &Rig, seed: u64) -> String {
     let disturbance = Disturbance::of(rig);
-    format!(
-        "a force of {} N rms on the cart and torques of {} N·m rms at every joint, drawn again in each tick (seed {seed})",
-        number(disturbance.force_n),
-        number(disturbance.torque_n_m)
-    )
+    // A drive that imposes the cart's acceleration does not feel a force.
+    let force = if disturbance.force_n == 0.0 {
+        String::new()
+    } else {
+        format!("a force of {} N rms on the cart and ", number(disturbance.force_n))
+    };
+    let torque = number(disturbance.torque_n_m);
+    format!("{force}torques of {torque} N·m rms at every joint, drawn again in each tick (seed {seed})")
 }
 
 /// Duration of a run (s): 10 s for links on a cart; ten times the slowest time constant for a model, whose time scale

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use upright::protocol::BAUD;
 use upright_page::Lesson;
 
 use super::motions::without_knots;
@@ -12,15 +13,18 @@ use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 
 const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
-const WORKER: &str = concat!(include_str!("page/worker.js"), include_str!("page/running.js"));
-const SCRIPTS: [&str; 8] = [
+const WORKER: &str =
+    concat!(include_str!("page/worker.js"), include_str!("page/running.js"), include_str!("page/talking.js"));
+const SCRIPTS: [&str; 10] = [
     include_str!("page/lzma.js"),
     include_str!("page/link.js"),
     include_str!("page/motions.js"),
     include_str!("page/drawing.js"),
     include_str!("page/editor.js"),
+    include_str!("page/serial.js"),
     include_str!("page/balance.js"),
     include_str!("page/lessons.js"),
+    include_str!("page/trust.js"),
     include_str!("page/desk.js"),
 ];
 
@@ -57,6 +61,7 @@ pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
     let parts = [
         ("{policy}", policy),
         ("{style}", style),
+        ("{baud}", BAUD.to_string()),
         ("{examples}", embedded(&shown)),
         ("{lessons}", embedded(&lessons)),
         ("{worker}", embedded(&bare(WORKER))),

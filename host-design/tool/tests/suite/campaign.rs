@@ -33,8 +33,28 @@ fn every_defect_is_found_and_nothing_else() {
 }
 
 #[test]
+fn every_defect_of_a_stepper_is_found_and_nothing_else() {
+    for name in ["single-stepper", "double-stepper", "quadruple-stepper"] {
+        let (rig, table) = rig_and_table(name);
+        let kinds = kinds(table, RunPlace::Host);
+        assert!(kinds.contains(&Defect::CartJammed) && !kinds.contains(&Defect::CartEncoderFrozen));
+        let result = run(&on_host(rig, table), &kinds, 5 * kinds.len() as u64);
+        for row in &result.rows {
+            println!("{name}: {row:?}");
+            assert!(row.wrong.is_empty() && row.runs == 5, "{name}: {row:?}");
+        }
+    }
+}
+
+#[test]
 fn without_detection_every_defect_that_needs_it_is_missed() {
-    let (rig, table) = rig_and_table("quadruple-paper");
+    for name in ["quadruple-paper", "quadruple-stepper"] {
+        missed_without_detection(name);
+    }
+}
+
+fn missed_without_detection(name: &'static str) {
+    let (rig, table) = rig_and_table(name);
     let kinds: Vec<Defect> =
         kinds(table, RunPlace::Host).into_iter().filter(|kind| kind.needs_detection()).collect();
     let blind = Setup { detection: false, ..on_host(rig, table) };

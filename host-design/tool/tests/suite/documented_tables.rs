@@ -13,6 +13,7 @@ use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
 use crate::published::rig_path;
+use crate::stepper_command::with_motor;
 
 fn upright(arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap();
@@ -235,11 +236,13 @@ fn explains(listed: &str, name: &str) -> bool {
 #[test]
 fn every_row_of_verify_is_explained() {
     let rig = rig_path("single-quanser-ip02");
-    let report = upright(&["verify", rig.to_str().unwrap(), "--law", "lqr", "--runs", "1"]);
-    let (figures, _) = report.split_once("\nrequirements").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let reports = [rig.display().to_string(), with_motor(folder.path())]
+        .map(|rig| upright(&["verify", &rig, "--law", "lqr", "--runs", "1"]));
     // Two spaces, then the name in 26 columns; a line without a name continues the one above.
-    let names: Vec<&str> = figures
-        .lines()
+    let names: Vec<&str> = reports
+        .iter()
+        .flat_map(|report| report.split_once("\nrequirements").unwrap().0.lines())
         .filter_map(|line| line.strip_prefix("  ")?.get(..26).map(str::trim))
         .filter(|name| !name.is_empty())
         .collect();

@@ -36,6 +36,8 @@ mod serial_errors;
 mod shaken;
 mod site_bits;
 mod site_page;
+mod site_serial;
+mod site_shown;
 mod site_twin;
 mod split_command;
 mod stepper_command;

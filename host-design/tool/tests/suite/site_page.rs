@@ -15,7 +15,7 @@ use crate::site_bits::is_wanted;
 
 /// Most bytes that a server sends for the page, compressed.
 const COMPRESSED: usize = 1_000_000;
-const TELEPHONE: u32 = 390;
+pub(crate) const TELEPHONE: u32 = 390;
 
 pub(crate) fn root() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -39,7 +39,7 @@ pub(crate) fn type_in(browser: &mut Browser, toml: &str) {
 }
 
 /// What the command line writes into a file.
-fn written(arguments: &[&str], option: &str) -> String {
+pub(crate) fn written(arguments: &[&str], option: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("written");
     let status = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).arg(option).arg(&file).output();
@@ -49,6 +49,11 @@ fn written(arguments: &[&str], option: &str) -> String {
 
 /// The page in a folder, opened; `None` where it cannot be.
 pub(crate) fn opened() -> Option<(Browser, tempfile::TempDir)> {
+    opened_in(1280)
+}
+
+/// The same in a window of this width (CSS pixels).
+pub(crate) fn opened_in(width: u32) -> Option<(Browser, tempfile::TempDir)> {
     let what = "the page that designs rigs";
     let mut browser = is_wanted(what).then(|| Browser::for_test_of(what)).flatten()?;
     let folder = tempfile::tempdir().unwrap();
@@ -60,7 +65,7 @@ pub(crate) fn opened() -> Option<(Browser, tempfile::TempDir)> {
     eprintln!("the page has {} bytes, {compressed} compressed", text.len());
     assert!(compressed < COMPRESSED, "{compressed} bytes");
     let begin = Instant::now();
-    browser.open(&file, 1280, "light", "screen");
+    browser.open(&file, width, "light", "screen");
     until(&mut browser, "upright.desk.design && upright.desk.poles");
     eprintln!("gains and poles of four links after {:.2} s", begin.elapsed().as_secs_f64());
     Some((browser, folder))
@@ -85,6 +90,33 @@ fn a_rig_is_designed_and_exported_in_the_page_as_on_the_command_line() {
     // Negative control: the policy keeps the page from asking anybody.
     browser.value("fetch('data:,hello').catch(() => 0)");
     assert!(browser.errors().iter().any(|error| error.contains("Content Security Policy")));
+}
+
+#[test]
+fn the_trust_report_of_the_page_is_that_of_this_computer_and_goes_with_its_rig() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    let single = std::fs::read_to_string(root().join("rigs/single-quanser-ip02.toml")).unwrap();
+    type_in(&mut browser, &single);
+    until(&mut browser, "upright.desk.design.states === 4 && !document.getElementById('verify').disabled");
+    browser.value("document.getElementById('verify').click()");
+    let mut desk = Desk::default();
+    let (mut here, mut step) = (Value::Null, 0);
+    while here["steps"].is_null() || here["step"] != here["steps"] {
+        let question = json!({ "ask": "verify", "toml": single, "step": step });
+        here = serde_json::from_str(&desk.answer(&question.to_string())).unwrap();
+        assert!(here["failed"].is_null(), "{here}");
+        step += 1;
+    }
+    // While it computes, the page is free: another question is answered.
+    assert!(browser.value("upright.ask({ ask: 'check', toml: '' })")["failed"].is_object());
+    until(&mut browser, "!document.getElementById('verify').disabled");
+    assert_eq!(browser.value("upright.trusted()"), here["laws"]);
+    let shown = browser.value("document.getElementById('trust-rows').children.length");
+    assert_eq!(shown, here["laws"][0]["rows"].as_array().unwrap().len());
+    // Negative control: what was found is not shown with another rig.
+    type_in(&mut browser, &single.replace("mass_kg", "mass_kg "));
+    until(&mut browser, "document.getElementById('trust-rows').children.length === 0");
+    assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
 #[test]
@@ -119,6 +151,14 @@ fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
     type_in(&mut browser, &toml.replace("force_weight = 1\n", "force_weight = 4\n"));
     let first_gain = "upright.desk.design.laws[0].continuous.k[0]";
     until(&mut browser, &format!("document.getElementById('problem').hidden && {first_gain} < 2"));
+
+    // A page that is loaded again has the rig as it was; with reduced motion, its run does not play by itself.
+    until(&mut browser, "upright.desk.at > 0");
+    browser.reduces_motion = true;
+    let address = browser.value("location.href");
+    browser.open_address(address.as_str().unwrap(), 1280, "light", "screen");
+    until(&mut browser, &format!("upright.desk.design && upright.desk.poles && {first_gain} < 2"));
+    assert_eq!(browser.value("upright.desk.at"), 0);
 
     // A weight that is moved changes text and gains.
     browser.value(

@@ -84,7 +84,7 @@ fn a_rig_balanced_in_webassembly_has_the_telemetry_and_motion_of_this_computer_b
 }
 
 /// Switches the designed rig on: raised, or hanging.
-fn balance(browser: &mut Browser, raised: bool) {
+pub(crate) fn balance(browser: &mut Browser, raised: bool) {
     browser.inside = None;
     browser.value(&format!("document.getElementById('raised').checked = {raised}"));
     until_designed(browser, "!document.getElementById('balance').disabled");

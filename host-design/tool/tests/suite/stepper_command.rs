@@ -1,10 +1,21 @@
 //! Commands for a rig whose drive imposes the cart's acceleration.
 
+use std::path::Path;
+
 use crate::command::{status, stderr, stdout, upright};
 use crate::published::rig_path;
 
 fn stepper() -> String {
     rig_path("single-stepper").display().to_string()
+}
+
+/// Writes the stepper with a motor behind its pulses into `folder`; returns the file.
+pub(crate) fn with_motor(folder: &Path) -> String {
+    let rig = std::fs::read_to_string(stepper()).unwrap().replacen("[cart]", "[cart]\nmass_kg = 0.3", 1);
+    let motor = "[reality]\nholding_force_n = 60\nfull_step_m = 2e-4\n";
+    let file = folder.join("motor.toml");
+    std::fs::write(&file, format!("{rig}\n{motor}")).unwrap();
+    file.display().to_string()
 }
 
 #[test]
@@ -41,12 +52,68 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
             format!("single-stepper: `upright {}` serves only drives that give a force", arguments[0]);
         assert!(stderr(&output).contains(&words), "{arguments:?}: {}", stderr(&output));
     };
-    for command in
-        ["verify", "faults", "false-alarms", "report", "compare", "robust", "swing-up", "transitions"]
-    {
+    for command in ["false-alarms", "compare", "robust", "swing-up", "transitions"] {
         refused(&[command, &rig]);
     }
-    refused(&["twin", &rig]);
     refused(&["commission", &rig, "--target", "host"]);
     refused(&["identify", &rig, "nothing.log"]);
+    for (command, option) in
+        [("twin", "--target"), ("faults", "--target"), ("faults", "--jog"), ("faults", "--shake")]
+    {
+        let target = if option == "--target" { &["qemu"][..] } else { &[] };
+        let output = upright(&[&[command, &rig, option], target].concat());
+        assert_eq!(status(&output), 2, "{}", stderr(&output));
+        let words = format!("`upright {command} {option}` serves only drives that give a force");
+        assert!(stderr(&output).contains(&words), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn verify_tells_how_slow_a_stepper_may_be_and_which_force_it_needs() {
+    let text = |rig: &str| {
+        let verified = upright(&["verify", rig, "--runs", "40"]);
+        println!("{}{}", stdout(&verified), stderr(&verified));
+        assert!(status(&verified) < 2, "{}", stderr(&verified));
+        stdout(&verified).to_owned()
+    };
+    let ideal = text(&stepper());
+    for words in ["least resonance", "least bandwidth", "acceleration 0.0", "push, end of link 1"] {
+        assert!(ideal.contains(words), "{words}");
+    }
+    // Negative controls: a cart without a mass, and forces on it.
+    for words in ["force needed", "NOT STABLE", "push, cart", "RMS, force", "RMS, encoder 1"] {
+        assert!(!ideal.contains(words), "{words}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let with_motor = text(&with_motor(folder.path()));
+    for words in ["force needed", "% of the motor's", "push, cart"] {
+        assert!(with_motor.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn the_report_of_a_stepper_shows_its_acceleration() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report.html");
+    let made = upright(&["report", &stepper(), "--out", out.to_str().unwrap(), "--runs", "20"]);
+    assert_eq!(status(&made), 0, "{}", stderr(&made));
+    let page = std::fs::read_to_string(&out).unwrap();
+    assert!(page.contains("acceleration u (m/s²)") && page.contains("largest acceleration"));
+    assert!(!page.contains("force u (N)") && !page.contains("largest force"));
+}
+
+#[test]
+fn a_stepper_moves_on_a_page() {
+    let twin = upright(&["twin", &stepper(), "--duration", "0.5"]);
+    assert_eq!(status(&twin), 0, "{}", stderr(&twin));
+    assert!(stdout(&twin).contains("http://"), "{}", stdout(&twin));
+}
+
+#[test]
+fn a_defect_of_a_stepper_is_found_and_one_that_it_cannot_have_is_refused() {
+    let jammed = upright(&["faults", &stepper(), "--kind", "cart-jammed", "--runs", "3"]);
+    assert_eq!(status(&jammed), 0, "{}{}", stdout(&jammed), stderr(&jammed));
+    assert!(stdout(&jammed).contains("without detection"), "{}", stdout(&jammed));
+    let stuck = upright(&["faults", &stepper(), "--kind", "motor-stuck", "--runs", "3"]);
+    assert_eq!(status(&stuck), 2, "{}", stdout(&stuck));
 }

@@ -68,6 +68,22 @@ pub fn survival(
     Ok(SizeSearch { rig, table, law, settings }.survival(imperfection, &[])?)
 }
 
+/// Runs `law` with one imperfection alone, of this size.
+///
+/// # Errors
+/// As [`imperfections()`].
+pub fn of_size(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    settings: &ImperfectionSettings,
+    imperfection: &Imperfection,
+    size: f64,
+) -> Result<SizeRuns, VerifyError> {
+    chain(rig, "imperfections")?;
+    Ok(SizeSearch { rig, table, law, settings }.alone(imperfection, size)?)
+}
+
 /// Runs `law` with the imperfections that it has to survive according to `[verify]`; empty if there are none.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Rows from the linear model of the loop.
 
 use super::quantity::Values::{Each, One};
-use super::quantity::{TrustQuantity, force, is_chain, number};
+use super::quantity::{TrustQuantity, force, input, is_chain, number};
 use crate::rig::Rig;
 use crate::verify::{LawTrust, Margins, NoiseShare};
 
@@ -17,7 +17,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
         name: "gain margin",
         meaning: "factors by which the real force may constantly differ from the commanded force before the loop is \
-                  unstable",
+                  unstable; of a stepper, the acceleration",
         values: One(|_, law| {
             let margins = margins(law)?;
             let highest = margins.highest_gain.map_or("any".to_owned(), number);
@@ -72,6 +72,17 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         values: One(|_, law| Some(format!("{} ms", number(1e3 * law.linear.tick.as_ref()?.jitter_s)))),
     },
     TrustQuantity {
+        name: "least resonance",
+        meaning: "frequency to which the resonance of a step motor with the cart may fall before the loop, which does not know \
+                  of it, is unstable; damping ratio 0.1",
+        values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.resonance_hz)))),
+    },
+    TrustQuantity {
+        name: "least bandwidth",
+        meaning: "the same for the bandwidth of a servo that follows its speed with a lag of first order",
+        values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.bandwidth_hz)))),
+    },
+    TrustQuantity {
         name: "f32 gains",
         meaning: "largest rounding error of a gain in units in the last place (at most 0.5: all are correctly rounded), and \
                   the change of the spectral radius",
@@ -118,6 +129,18 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
             })
         }),
     },
+    TrustQuantity {
+        name: "force needed",
+        meaning: "largest force that a stepper needed in those runs, with the cart's mass and friction, and its share of what \
+                  the motor in `[reality]` has at that speed: stay below a half",
+        values: One(|_, law| {
+            let found = law.noise_run.as_ref()?.ripple.as_ref()?;
+            let share = found
+                .needed_share
+                .map_or(String::new(), |share| format!(", {} % of the motor's", number(1e2 * share)));
+            Some(format!("{} N{share}", number(found.needed_force_n?)))
+        }),
+    },
 ];
 
 fn margins(law: &LawTrust) -> Option<&Margins> {
@@ -131,5 +154,5 @@ fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
     }
     let angles: Vec<String> = states.iter().skip(2).step_by(2).map(|&angle| number(1e3 * angle)).collect();
     let cart_mm = number(1e3 * states[rig.output()]);
-    format!("force {} N, cart {cart_mm} mm, angles {} mrad", number(force_n), angles.join(" "))
+    format!("{} {}, cart {cart_mm} mm, angles {} mrad", input(rig).0, force(rig, force_n), angles.join(" "))
 }

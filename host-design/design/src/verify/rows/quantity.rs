@@ -1,7 +1,7 @@
 //! What a row of the trust report is made from.
 
 use crate::number::significant;
-use crate::rig::Rig;
+use crate::rig::{CartInput, Rig};
 use crate::verify::LawTrust;
 
 /// One quantity of the trust report.
@@ -33,10 +33,18 @@ pub(super) fn is_chain(rig: &Rig) -> bool {
     rig.chain().is_some()
 }
 
-/// A force, or the input of a model, with its unit.
+/// A force, the cart's acceleration where the drive imposes that, or the input of a model, with its unit.
 pub(super) fn force(rig: &Rig, force_n: f64) -> String {
-    let unit = if is_chain(rig) { " N" } else { "" };
-    format!("{}{unit}", number(force_n))
+    format!("{}{}", number(force_n), input(rig).1)
+}
+
+/// Name and unit of the plant's input.
+pub(super) fn input(rig: &Rig) -> (&'static str, &'static str) {
+    match rig.actuator.input() {
+        _ if !is_chain(rig) => ("input", ""),
+        CartInput::Force => ("force", " N"),
+        CartInput::Acceleration => ("acceleration", " m/s²"),
+    }
 }
 
 /// Signs of a combination, such as `+-+-`.

@@ -1,7 +1,8 @@
 //! Rows from runs against the nonlinear plant.
 
 use super::quantity::Values::{Each, One};
-use super::quantity::{TrustQuantity, force, is_chain, number, signs};
+use super::quantity::{TrustQuantity, force, input, is_chain, number, signs};
+use crate::rig::Rig;
 use crate::verify::{LawTrust, Outcome, PushSurvival};
 
 pub(super) const QUANTITIES: &[TrustQuantity] = &[
@@ -9,7 +10,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         name: "largest tilt, ",
         meaning: "largest initial angle from the vertical of this link alone, all others vertical, from which the loop \
                   recovers",
-        values: Each(|_, law| tilts(law)),
+        values: Each(tilts),
     },
     TrustQuantity {
         name: "largest tilt, all links",
@@ -26,8 +27,9 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         values: One(|rig, law| {
             let step = law.attraction.as_ref()?.raw_step.as_ref()?;
             let largest = if step.at_largest_tried { " (largest tried)" } else { "" };
-            let [m, peak] = if is_chain(rig) { [" m", "peak force"] } else { ["", "peak input"] };
-            Some(format!("{}{m}{largest}, {peak} {}", number(step.size), force(rig, step.peak_force_n)))
+            let m = if is_chain(rig) { " m" } else { "" };
+            let peak = force(rig, step.peak_force_n);
+            Some(format!("{}{m}{largest}, peak {} {peak}", number(step.size), input(rig).0))
         }),
     },
     TrustQuantity {
@@ -60,10 +62,11 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
         name: "worst mass errors",
         meaning: "the combination that falls first or, if none falls, has the largest angle",
-        values: One(|_, law| {
+        values: One(|rig, law| {
             let weakest = &law.corners.as_ref()?.weakest;
             let (masses, end) = (signs(&weakest.signs), end(&weakest.outcome));
-            Some(format!("{masses} (cart, then links: + heavier, - lighter){end}"))
+            let cart = if weakest.signs.len() > rig.links() { "cart, then " } else { "" };
+            Some(format!("{masses} ({cart}links: + heavier, - lighter){end}"))
         }),
     },
     TrustQuantity {
@@ -118,11 +121,12 @@ fn pushes(law: &LawTrust) -> Vec<(String, String)> {
     of_body.map(row).collect()
 }
 
-fn tilts(law: &LawTrust) -> Vec<(String, String)> {
+fn tilts(rig: &Rig, law: &LawTrust) -> Vec<(String, String)> {
     let tilts = law.attraction.iter().flat_map(|attraction| &attraction.tilts);
     let row = |tilt: &crate::verify::Tilt| {
         let (size, degrees) = (number(tilt.edge.size), tilt.edge.size.to_degrees());
-        let value = format!("{size} rad ({degrees:.2}°), peak force {} N", number(tilt.edge.peak_force_n));
+        let peak = force(rig, tilt.edge.peak_force_n);
+        let value = format!("{size} rad ({degrees:.2}°), peak {} {peak}", input(rig).0);
         (format!("link {}", tilt.link), value)
     };
     tilts.map(row).collect()

@@ -82,7 +82,13 @@ fn kind(name: &str) -> Result<Defect, String> {
 impl FaultsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        rig.refuse_acceleration("faults")?;
+        match (self.swing_up, self.jog, self.shake) {
+            (true, ..) => rig.refuse_acceleration("faults --swing-up")?,
+            (_, true, _) => rig.refuse_acceleration("faults --jog")?,
+            (.., true) => rig.refuse_acceleration("faults --shake")?,
+            _ if self.target != TargetOption::Host => rig.refuse_acceleration("faults --target")?,
+            _ => {}
+        }
         let table = if self.swing_up {
             with_stored_motions(&self.variation.rig, &rig, table, Wanted::SwingUp)?
         } else {

@@ -122,7 +122,12 @@ fn random_plants(
 impl VerifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, certified, mut table) = self.variation.designed()?;
-        rig.refuse_acceleration("verify")?;
+        if self.imperfections {
+            rig.refuse_acceleration("verify --imperfections")?;
+        }
+        if self.late > 0.0 {
+            rig.refuse_acceleration("verify --late")?;
+        }
         for other in Law::ALL.into_iter().filter(|law| self.law.is_some_and(|only| only != *law)) {
             table.laws[other] = None;
         }

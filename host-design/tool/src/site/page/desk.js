@@ -3,11 +3,14 @@
 const examples = JSON.parse(embedded('examples'));
 const DEGREES = 180 / Math.PI;
 const LEAST_MS = 16;
+const KEPT = 'upright rig'; // name in the tab's store
+const NEEDS_TABLE = ['save-table', 'save-header', 'save-csv', 'balance', 'connect', 'verify'];
 
 const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, error: null };
 let checker = null;
 let designer = null;
 let twin = null;
+let trust = null;
 
 const editor = new Editor(() => changed());
 const set = (key, value) => {
@@ -26,12 +29,13 @@ function tell(text, isBad = false) {
 }
 
 function changed() {
+  trust.forget();
   checker.ask('check', { ask: 'check', toml: editor.value }, checked);
 }
 
 function checked(answer) {
   editor.mark(answer.failed);
-  for (const id of ['save-table', 'save-header', 'save-csv', 'balance']) byId(id).disabled = true;
+  for (const id of NEEDS_TABLE) byId(id).disabled = true;
   if (answer.failed !== undefined) return;
   desk.sketch = answer;
   byId('unusual').replaceChildren(...answer.unusual.map((text) => element('li', { textContent: text })));
@@ -66,7 +70,7 @@ function designed(answer, ms) {
   }
   const table = answer.crc === null ? `no table: ${answer.no_table}` : `table ${answer.crc}`;
   tell(`${answer.states} states; every gain equal at ${answer.bits[0]} and ${answer.bits[1]} bits; ${table}; designed and run in ${(ms / 1e3).toFixed(2)} s`);
-  for (const id of ['save-table', 'save-header', 'save-csv', 'balance']) byId(id).disabled = answer.crc === null;
+  for (const id of NEEDS_TABLE) byId(id).disabled = answer.crc === null;
   showLoop();
   showDesign();
 }
@@ -221,10 +225,19 @@ function listen() {
     show();
     byId(id).addEventListener('input', () => { show(); redesign(); });
   }
-  byId('law').addEventListener('change', () => { showLoop(); showDesign(); });
+  byId('law').addEventListener('change', () => { showLoop(); showDesign(); trust.show(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
   byId('balance').addEventListener('click', () => {
     twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked });
+  });
+  byId('connect').hidden = navigator.serial === undefined;
+  byId('no-serial').hidden = navigator.serial !== undefined;
+  byId('connect').addEventListener('click', async ({ target }) => {
+    try {
+      twin.open({ toml: editor.value, motions: motions() }, await SerialLine.open(Number(target.dataset.baud)));
+    } catch (error) {
+      tell(`the board's port cannot be opened: ${error.message}`, true);
+    }
   });
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
@@ -249,14 +262,21 @@ function open(text) {
   changed();
 }
 
+// The tab's store, from which a page that is loaded again takes its rig; null where the person forbids it.
+function kept() {
+  try { return sessionStorage; } catch { return null; }
+}
+
 async function begin() {
   listen();
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
-  editor.set(rigOfLink() ?? first.toml);
+  editor.set(rigOfLink() ?? kept()?.getItem(KEPT) ?? first.toml);
+  addEventListener('pagehide', () => kept()?.setItem(KEPT, editor.value));
   const module = bytesOf('module');
   checker = new Thread(module);
   designer = new Thread(module);
+  trust = new Trust(module);
   twin = new Twin(module, (why) => tell(why, true));
   const begins = (name) => {
     byId('example').value = name;
@@ -267,5 +287,5 @@ async function begin() {
 }
 
 // For tests, and for the curious.
-globalThis.upright = { desk, exported, motions, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
+globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
 begin().catch((error) => tell(`this browser cannot compute the design: ${error.message}`, true));

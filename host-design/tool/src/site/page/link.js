@@ -31,11 +31,11 @@ class Thread {
     this.next();
   }
 
-  // Runs a rig, for the page at the other end of the port.
-  run(rig, theme, port, take) {
+  // Runs a rig, or talks to the board at a line, for the page at the other end of the port.
+  run(rig, theme, port, line, take) {
     this.ready.then(() => {
       this.asked = { take };
-      this.worker.postMessage({ id: 'run', rig, theme }, [port]);
+      this.worker.postMessage({ id: 'run', rig, theme }, line === null ? [port] : [port, line]);
     });
   }
 

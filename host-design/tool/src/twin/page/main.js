@@ -73,13 +73,15 @@ const drawers = new Drawers((what) => controls.machine(what));
 // a page ends with that page.
 function remember() {
   if (location.protocol === 'about:') return;
-  const kept = sessionStorage.getItem(KEPT);
-  sessionStorage.removeItem(KEPT);
+  let store = null;
+  try { store = sessionStorage; } catch { return; } // forbidden by the person
+  const kept = store.getItem(KEPT);
+  store.removeItem(KEPT);
   const [address] = kept?.split(' ', 1) ?? [];
   if (address === location.href) scopes.restore(kept.slice(address.length));
   addEventListener('pagehide', () => {
     // A store that is too small keeps nothing.
-    try { sessionStorage.setItem(KEPT, `${location.href} ${scopes.kept()}`); } catch {}
+    try { store.setItem(KEPT, `${location.href} ${scopes.kept()}`); } catch {}
   });
 }
 

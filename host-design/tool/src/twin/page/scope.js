@@ -24,7 +24,7 @@ function panels(hello) {
       curves: joints.map(({ name, sensor }) => ({ name, value: estimate(2 * sensor, DEGREES), seen: (state) => state[2 * sensor] * DEGREES, ink: `--c${(sensor - 1) % 6}` })) },
     { title: 'Position', unit: 'm', least: 0.01, without: 'no estimate', limits: hello.soft_m, curves: [
       { name: 'cart', value: estimate(0), seen: (state) => state[0], ink: '--ink' }, { name: 'set-point', value: (t) => t.setpoint_m, ink: '--link' }] },
-    { title: 'Force', unit: 'N', least: 0.2, without: 'motor off', limits: [hello.force_limit_n, -hello.force_limit_n], curves: [
+    { title: hello.input[0], unit: hello.input[1], least: 0.2, without: 'motor off', limits: [hello.force_limit_n, -hello.force_limit_n], curves: [
       { name: 'requested', value: motor('requested_n'), ink: '--c1' }, { name: 'applied', value: motor('applied_n'), ink: '--ink' }] },
     { title: 'Rate', unit: '°/s', least: 10, without: 'no estimate', curves: each((t, sensor) => estimate(2 * sensor + 1, DEGREES)(t)) },
     { title: 'Surprise', unit: 'mm, mrad', least: 0.1, without: 'no prediction', curves: hello.sensors.map((name, sensor) => (

@@ -167,6 +167,58 @@ impl Browser {
         }
     }
 
+    /// Presses or releases a key (`keyDown`, `keyUp`) so that the browser does what it does for it: writes a letter,
+    /// moves the focus (Tab), presses a button (Enter).
+    pub(crate) fn key_event(&mut self, kind: &str, key: &str) {
+        let (text, code) = match key {
+            "Enter" => ("\r", 13),
+            "Tab" => ("", 9),
+            key if key.len() == 1 => (key, 0),
+            _ => ("", 0),
+        };
+        let text = if kind == "keyDown" { text } else { "" };
+        let event = json!({ "type": kind, "key": key, "text": text, "windowsVirtualKeyCode": code });
+        self.call("Input.dispatchKeyEvent", event);
+    }
+
+    /// Presses and releases a key, as [`Browser::key_event`].
+    pub(crate) fn strike(&mut self, key: &str) {
+        self.key_event("keyDown", key);
+        self.key_event("keyUp", key);
+    }
+
+    /// An editing command at the focus, such as `selectAll`, which the keys of each system give in another way.
+    pub(crate) fn edit(&mut self, command: &str) {
+        self.call("Input.dispatchKeyEvent", json!({ "type": "keyDown", "key": "", "commands": [command] }));
+    }
+
+    /// From now on, what the page saves goes into this folder.
+    pub(crate) fn save_into(&mut self, folder: &Path) {
+        let behaviour = json!({ "behavior": "allow", "downloadPath": folder });
+        self.call("Page.setDownloadBehavior", behaviour);
+    }
+
+    /// Memory of the pages' processes (KiB); `None` where the system does not tell.
+    pub(crate) fn resident_kib(&self) -> Option<u64> {
+        let read = |id: u32, file: &str| std::fs::read_to_string(format!("/proc/{id}/{file}")).ok();
+        let field = |id: u32, name: &str| -> Option<u64> {
+            let status = read(id, "status")?;
+            status.lines().find(|line| line.starts_with(name))?.split_whitespace().nth(1)?.parse().ok()
+        };
+        let is_own = |mut id: u32| {
+            while id > 1 && id != self.process.id() {
+                id = field(id, "PPid:").map_or(0, |parent| parent as u32);
+            }
+            id == self.process.id()
+        };
+        let processes = std::fs::read_dir("/proc").ok()?;
+        let ids = processes.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse::<u32>().ok());
+        let pages = ids.filter(|&id| {
+            read(id, "cmdline").is_some_and(|line| line.contains("--type=renderer")) && is_own(id)
+        });
+        pages.filter_map(|id| field(id, "RssAnon:")).reduce(|one, other| one + other)
+    }
+
     /// The value of an expression; waits for promises.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let expression = match self.inside {
