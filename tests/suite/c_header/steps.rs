@@ -13,7 +13,7 @@ use upright::supervision::fault::Fault;
 use upright::table::{Equilibrium, GainTable, Law};
 use upright_design::export::c_header;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Bench, Scenario};
+use upright_design::simulate::{Bench, Scenario, StepDefect};
 use upright_design::table::{TableValues, WithSize, with_size};
 
 /// What acts on the rig or its wires while it balances, by the tick of balancing.
@@ -103,7 +103,7 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
         let upright = table.limits.unwound(controller.encoders().counts(), Equilibrium::UPRIGHT);
         controller.encoders_mut().home(raw, &upright);
         controller.start(raw).unwrap();
-        let mut detection = Detection::default();
+        let mut detection = Detection::of_motor(table.motor_sensor());
         detection.start(controller.encoders().counts(), &controller.positions().data.0[0]);
         Self { table, controller, detection, debounce: Debounce::default(), fault: None }
     }
@@ -189,7 +189,7 @@ fn faults_of_a_stepper_stop_the_pulses_in_the_tick_of_the_firmware() {
     }
     let (rig, table) = rig_and_table("single-stepper");
     let header = c_header(rig, table).unwrap();
-    let defects: [(Disturbance, &[Fault]); 3] = [
+    let defects: [(Disturbance, &[Fault]); 4] = [
         // The link's counter stands still.
         (
             |tick, _, raw| {
@@ -217,6 +217,15 @@ fn faults_of_a_stepper_stop_the_pulses_in_the_tick_of_the_firmware() {
             },
             &[Fault::Angle, Fault::Motor, Fault::Encoder],
         ),
+        // The drive is off: the motor's test finds it, by the link.
+        (
+            |tick, bench, _| {
+                if tick >= 500 {
+                    bench.spoil(StepDefect::Off)
+                }
+            },
+            &[Fault::Motor],
+        ),
     ];
     for (number, (defect, expected)) in defects.into_iter().enumerate() {
         let run = recorded_steps(rig, table, &scenario(rig, Law::Lqr, 3000), defect);
@@ -224,5 +233,10 @@ fn faults_of_a_stepper_stop_the_pulses_in_the_tick_of_the_firmware() {
         assert!(run.wanted.len() > 500, "{number}");
         let answers = replayed(&header, STRICT, &run.input);
         assert_eq!(differing(&run, &answers), 0, "{number} {}", first_difference(&run, &answers));
+        // The negative control: with the motor's test at the cart, whose count shows nothing.
+        if expected == [Fault::Motor] {
+            let at_cart = header.replace("UPRIGHT_MOTOR_SENSOR 1", "UPRIGHT_MOTOR_SENSOR 0");
+            assert!(differing(&run, &replayed(&at_cart, STRICT, &run.input)) > 0);
+        }
     }
 }

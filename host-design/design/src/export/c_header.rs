@@ -94,6 +94,10 @@ fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Re
     }
     define("HAS_MOTOR", u8::from(table.motor.is_some()).to_string())?;
     define("HAS_STEPS", u8::from(table.steps.is_some()).to_string())?;
+    define(
+        "MOTOR_SENSOR",
+        format!("{} /* whose innovation shows what the motor does */", table.motor_sensor()),
+    )?;
     define("HAS_FRICTION", u8::from(table.friction.is_some()).to_string())?;
     define("PATTERN", format!("{pattern} /* of Ad: see upright_predict_state */"))?;
     writeln!(

@@ -285,7 +285,7 @@ static inline upright_fault upright_test(upright_controller *c, const float *y, 
         found = upright_reject(c, sensor);
     }
     float missing = c->missing[0];
-    c->correlation = keep * c->correlation + c->innovation[0] * missing;
+    c->correlation = keep * c->correlation + c->innovation[UPRIGHT_MOTOR_SENSOR] * missing;
     c->energy = keep * c->energy + missing * missing;
     if (found != UPRIGHT_NO_FAULT) {
         return found;
@@ -294,7 +294,7 @@ static inline upright_fault upright_test(upright_controller *c, const float *y, 
         *sensor = frozen;
         return UPRIGHT_FROZEN;
     }
-    *sensor = 0;
+    *sensor = UPRIGHT_MOTOR_SENSOR;
     bool lacks_force =
         c->energy > upright_table.motor_energy && c->correlation > upright_table.motor_ratio * c->energy;
     return lacks_force ? UPRIGHT_MOTOR : UPRIGHT_NO_FAULT;

@@ -168,7 +168,8 @@ impl Wiring {
             .flat_map(|one| (one + 1..self.channels).map(move |other| WiringFault::Swapped(one, other)));
         let counts =
             (0..self.channels).flat_map(|channel| FACTORS.map(|factor| WiringFault::Counts(channel, factor)));
-        let is_of = |channel, fault: &WiringFault| matches!(*fault, WiringFault::Counts(of, _) if of == channel);
+        let is_of =
+            |channel, fault: &WiringFault| matches!(*fault, WiringFault::Counts(of, _) if of == channel);
         let is_new = |fault: &WiringFault| match *fault {
             WiringFault::Counts(channel, _) => !self.faults.iter().any(|other| is_of(channel, other)),
             _ => !self.faults.contains(fault),

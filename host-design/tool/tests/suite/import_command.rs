@@ -79,7 +79,11 @@ fn another_machine_is_refused_with_the_name_of_the_joint() {
             "move on the same link",
         ),
         ("<mass value=\"0.6\"/>", "<mass value=\"0\"/>", "joint \"slide\": its link has no mass"),
-        ("<mass value=\"0.6\"/>", "<mass value=\"heavy\"/>", "line 6: value = \"heavy\": numbers wanted here: 1"),
+        (
+            "<mass value=\"0.6\"/>",
+            "<mass value=\"heavy\"/>",
+            "line 6: value = \"heavy\": numbers wanted here: 1",
+        ),
         ("<mass value=\"0.6\"/>", "", "line 6: <inertial> has no <mass>"),
         ("<child link=\"upper\"/>", "<child link=\"uper\"/>", "\"uper\", which is not in the file"),
         ("<parent link=\"world\"/>", "<parent link=\"tip\"/>", "there is no prismatic joint"),
