@@ -52,14 +52,20 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
             format!("single-stepper: `upright {}` serves only drives that give a force", arguments[0]);
         assert!(stderr(&output).contains(&words), "{arguments:?}: {}", stderr(&output));
     };
-    for command in ["false-alarms", "compare", "robust", "swing-up", "transitions"] {
+    for command in ["compare", "robust", "swing-up", "transitions"] {
         refused(&[command, &rig]);
     }
     refused(&["commission", &rig, "--target", "host"]);
     refused(&["identify", &rig, "nothing.log"]);
-    for (command, option) in
-        [("twin", "--target"), ("faults", "--target"), ("faults", "--jog"), ("faults", "--shake")]
-    {
+    for (command, option) in [
+        ("twin", "--target"),
+        ("faults", "--target"),
+        ("faults", "--jog"),
+        ("faults", "--shake"),
+        ("verify", "--imperfections"),
+        ("report", "--imperfections"),
+        ("false-alarms", "--corners"),
+    ] {
         let target = if option == "--target" { &["qemu"][..] } else { &[] };
         let output = upright(&[&[command, &rig, option], target].concat());
         assert_eq!(status(&output), 2, "{}", stderr(&output));
@@ -100,6 +106,20 @@ fn the_report_of_a_stepper_shows_its_acceleration() {
     let page = std::fs::read_to_string(&out).unwrap();
     assert!(page.contains("acceleration u (m/s²)") && page.contains("largest acceleration"));
     assert!(!page.contains("force u (N)") && !page.contains("largest force"));
+}
+
+#[test]
+fn a_healthy_stepper_is_not_turned_off() {
+    let healthy = |rig: &str| upright(&["false-alarms", rig, "--runs", "4", "--duration", "60"]);
+    let quiet = healthy(&stepper());
+    assert_eq!(status(&quiet), 0, "{}{}", stdout(&quiet), stderr(&quiet));
+    // Negative control: disturbed thirty times as much as the design expects.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("shaken.toml");
+    let rig = std::fs::read_to_string(stepper()).unwrap();
+    std::fs::write(&file, format!("{rig}\n[verify]\ntorque_rms_n_m = 3e-2\n")).unwrap();
+    let shaken = healthy(file.to_str().unwrap());
+    assert_eq!(status(&shaken), 1, "{}{}", stdout(&shaken), stderr(&shaken));
 }
 
 #[test]

@@ -53,7 +53,9 @@ pub(crate) struct HealthyHoursCommand {
 impl HealthyHoursCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        rig.refuse_acceleration("false-alarms")?;
+        if self.corners {
+            rig.refuse_acceleration("false-alarms --corners")?;
+        }
         let laws: Vec<Law> = table
             .laws
             .present()
