@@ -156,7 +156,7 @@ mod tests {
         let answers: Vec<Value> = (0..3).map(|step| ask(&mut desk, "single-stepper", step)).collect();
         let last = &answers[2];
         let has = |name: &str| last["laws"][0]["rows"].as_array().unwrap().iter().any(|row| row[0] == name);
-        assert!(has("least resonance") && has("push, link 1") && !has("joint_friction_n_m"));
+        assert!(has("least resonance") && has("push, end of link 1") && !has("joint_friction_n_m"));
         assert_eq!(last["steps"], json!(1 + 2 * last["laws"].as_array().unwrap().len()));
     }
 }

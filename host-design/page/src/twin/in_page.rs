@@ -295,7 +295,6 @@ mod tests {
                 page.run(&[]);
             }
             let score = page.run(&[])["picture"]["machine"]["challenge"].clone();
-            println!("{rig}: {score}");
             assert!(score["survived_n"].as_f64().unwrap() > 0.0, "{score}");
             for name in ["motor-dead", "motor-reversed", "cart-jammed", "pulses-missing"] {
                 page.run(&[json!({ "ask": "machine", "what": { "do": "restart", "upright": true } })]);
