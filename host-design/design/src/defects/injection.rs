@@ -51,9 +51,7 @@ pub struct Injection<'a> {
 /// weight.
 pub fn push_limit_n(rig: &Rig, table: &TableValues) -> f64 {
     match rig.chain().filter(|_| table.steps.is_some()) {
-        Some(chain) => {
-            0.05 * chain.gravity_m_per_s2 * chain.links.iter().map(|link| link.mass_kg).sum::<f64>()
-        }
+        Some(chain) => 0.05 * chain.gravity_m_per_s2 * chain.links_mass_kg(),
         None => f64::from(table.force_limit_n),
     }
 }

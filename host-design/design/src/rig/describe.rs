@@ -176,7 +176,7 @@ impl Description {
     fn chain(&mut self, chain: &Chain) {
         let n = chain.links.len();
         let length: f64 = chain.links.iter().map(|link| link.length_m).sum();
-        let links_kg = chain.links.iter().map(|link| link.mass_kg).sum::<f64>();
+        let links_kg = chain.links_mass_kg();
         self.value("links on a cart", n as f64, "", "");
         self.value("states", (2 * n + 2) as f64, "", "");
         match chain.cart.mass_kg {

@@ -3,6 +3,8 @@
 //! Poles, margins and covariances need the law as a matrix; this is the only place where it is written a second time.
 //! A simulation runs the firmware's own controller, and a test compares this model with it.
 
+use std::borrow::Cow;
+
 use upright::table::Law;
 
 use super::VerifyError;
@@ -301,15 +303,15 @@ impl<R: Real> LoopModel<R> {
 /// The design with the plant that `numbers` control. An observer that does not correct by the first sensor takes the
 /// cart's position and speed from the commands alone: where the cart really is changes nothing in the loop, so that it
 /// must not look like two poles at 1. Its rows decay within a tick.
-pub(super) fn seen_plant<R: Real>(certified: &Certified, numbers: &Numbers<R>) -> Certified {
-    let mut seen = certified.clone();
+pub(super) fn seen_plant<'a, R: Real>(certified: &'a Certified, numbers: &Numbers<R>) -> Cow<'a, Certified> {
     let is_unseen = numbers.observer.as_ref().is_some_and(|observer| {
         let column = observer.l.block(0, 0, observer.l.rows(), 1);
         column.entries().iter().all(R::is_zero)
     });
     if !is_unseen {
-        return seen;
+        return Cow::Borrowed(certified);
     }
+    let mut seen = certified.clone();
     let (design, rate) = (&mut seen.double, -1.0 / numbers.tick_s.to_f64());
     for cart in 0..2 {
         for column in 0..design.a.cols() {
@@ -318,7 +320,7 @@ pub(super) fn seen_plant<R: Real>(certified: &Certified, numbers: &Numbers<R>) -
         design.a[(cart, cart)] = rate;
         (design.b[(cart, 0)], design.bd[(cart, 0)]) = (0.0, 0.0);
     }
-    seen
+    Cow::Owned(seen)
 }
 
 /// Largest absolute value of a pole of the loop.

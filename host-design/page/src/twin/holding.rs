@@ -70,35 +70,32 @@ mod tests {
     use super::*;
     use upright::supervision::jog::MotorSign;
 
+    const CALIBRATED: Status =
+        Status { state: State::Calibrated, signs: Signs::Checked, motor: MotorSign::Unchecked };
+
+    fn hold_of(rig: &str) -> ManualHold {
+        ManualHold::new(&Rig::from_path(Path::new(&format!("../../rigs/{rig}.toml"))).unwrap())
+    }
+
     #[test]
     fn a_hand_moves_the_cart_only_while_a_drive_that_takes_pulses_is_off() {
-        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-stepper.toml")) else {
-            panic!("no such rig")
-        };
-        let calibrated =
-            Status { state: State::Calibrated, signs: Signs::Checked, motor: MotorSign::Unchecked };
-        let mut hold = ManualHold::new(&rig);
+        let mut hold = hold_of("single-stepper");
         hold.take(Holding::Hanging, &[0.1, 0.0, 0.0, 0.0]);
         let cart_m = |held: Option<&[f64]>| held.unwrap()[0];
-        assert!((cart_m(hold.tick(&calibrated, &[0.0; 4], Some(0.002))) - 0.102).abs() < 1e-12);
-        assert!((cart_m(hold.tick(&calibrated, &[0.0; 4], Some(0.0))) - 0.102).abs() < 1e-12);
-        assert!(cart_m(hold.tick(&calibrated, &[0.0; 4], None)) < 0.1, "the hand pushes it to the middle");
+        assert!((cart_m(hold.tick(&CALIBRATED, &[0.0; 4], Some(0.002))) - 0.102).abs() < 1e-12);
+        assert!((cart_m(hold.tick(&CALIBRATED, &[0.0; 4], Some(0.0))) - 0.102).abs() < 1e-12);
+        assert!(cart_m(hold.tick(&CALIBRATED, &[0.0; 4], None)) < 0.1, "the hand pushes it to the middle");
     }
 
     #[test]
     fn a_cart_that_the_motor_pushes_is_held_again_where_it_is() {
-        let Ok(rig) = Rig::from_path(Path::new("../../rigs/single-quanser-ip02.toml")) else {
-            panic!("no such rig")
-        };
-        let calibrated =
-            Status { state: State::Calibrated, signs: Signs::Checked, motor: MotorSign::Unchecked };
-        let mut hold = ManualHold::new(&rig);
+        let mut hold = hold_of("single-quanser-ip02");
         hold.take(Holding::Upright, &[0.2, 0.0, 0.0, 0.0]);
-        let jogging = Status { state: State::Jogging, ..calibrated };
+        let jogging = Status { state: State::Jogging, ..CALIBRATED };
         assert_eq!(hold.tick(&jogging, &[0.25, 0.3, 0.0, 0.1], None), None);
-        assert_eq!(hold.tick(&calibrated, &[0.3; 4], None), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
+        assert_eq!(hold.tick(&CALIBRATED, &[0.3; 4], None), Some([0.25, 0.0, 0.0, 0.0].as_slice()));
         // Negative control: a rig that is let go is not held.
         hold.take(Holding::Free, &[0.25, 0.0, 0.0, 0.0]);
-        assert_eq!(hold.tick(&calibrated, &[0.3; 4], None), None);
+        assert_eq!(hold.tick(&CALIBRATED, &[0.3; 4], None), None);
     }
 }

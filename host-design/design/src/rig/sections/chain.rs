@@ -130,8 +130,12 @@ pub struct Chain {
 impl Chain {
     /// Mass of the cart and all links (kg); a cart whose mass is not given counts nothing.
     pub fn total_mass_kg(&self) -> f64 {
-        let links_kg: f64 = self.links.iter().map(|link| link.mass_kg).sum();
-        self.cart.mass_kg.unwrap_or_default() + links_kg
+        self.cart.mass_kg.unwrap_or_default() + self.links_mass_kg()
+    }
+
+    /// Mass of all links (kg).
+    pub fn links_mass_kg(&self) -> f64 {
+        self.links.iter().map(|link| link.mass_kg).sum()
     }
 }
 
