@@ -12,7 +12,7 @@ use crate::harness::{Harness, HarnessError, with_firmware};
 use crate::rig::{PerJoint, Rig};
 use crate::study::Study;
 use crate::table::TableValues;
-use crate::verify::{VerifyError, at_rest_disturbed, chain};
+use crate::verify::{VerifyError, at_rest_disturbed, chain, first_mass};
 
 /// Time after which the set-point changes sides (s).
 const SIDE_S: f64 = 60.0;
@@ -65,7 +65,7 @@ impl Machines {
     pub fn count(self, rig: &Rig) -> u64 {
         match self {
             Self::Drawn(runs) => runs,
-            Self::Corners => rig.chain().map_or(0, |chain| 2 << chain.links.len()),
+            Self::Corners => rig.chain().map_or(0, |chain| 2 << (chain.links.len() - first_mass(rig))),
         }
     }
 
@@ -99,16 +99,20 @@ pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
 /// Machine at the combination of wrong masses with this number, with the full tolerances of `[robust]` for friction,
 /// zero errors and latency.
 ///
-/// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on.
+/// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on. Where the
+/// drive imposes the cart's acceleration, the lowest bit belongs to the first link.
 pub fn corner_machine(rig: &Rig, number: u64) -> Rig {
     let (Some(tolerances), Some(chain)) = (&rig.robust, rig.chain()) else {
         return rig.clone();
     };
     let mut machine = machine(rig, tolerances, 1.0);
     let percent = tolerances.mass_percent;
-    let wrong = |part: usize| if number >> part & 1 == 1 { percent } else { -percent };
+    let first = first_mass(rig);
+    let wrong = |part: usize| if number >> (part - first) & 1 == 1 { percent } else { -percent };
     let parameters = &mut machine.reality.parameters;
-    parameters.cart_mass_percent = wrong(0);
+    if first == 0 {
+        parameters.cart_mass_percent = wrong(0);
+    }
     parameters.link_mass_percent = PerJoint::each((1..=chain.links.len()).map(wrong).collect());
     machine
 }

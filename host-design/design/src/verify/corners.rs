@@ -91,7 +91,7 @@ pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
 }
 
 /// The first part whose mass matters (0: cart): a drive that imposes the cart's acceleration does not feel its mass.
-fn first_mass(rig: &Rig) -> usize {
+pub(crate) fn first_mass(rig: &Rig) -> usize {
     usize::from(rig.actuator.input() == CartInput::Acceleration)
 }
 

@@ -40,6 +40,7 @@ mod rows;
 mod tick;
 mod trial;
 
+pub(crate) use corners::first_mass;
 pub(crate) use covariance::stationary;
 pub(crate) use error::chain;
 pub(crate) use loop_model::{Numbers, radius};

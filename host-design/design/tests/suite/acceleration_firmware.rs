@@ -47,7 +47,10 @@ fn every_stepper_is_homed_jogged_and_balanced_and_follows_its_set_point() {
         let run = with_firmware(&values, |firmware| record(&rig, &values, &scenario, firmware));
         let run = run.unwrap().unwrap();
         assert!(run.fault.is_none() && run.summary.survives(), "{name}: {:?} {}", run.fault, run.summary);
-        let cart_m = run.trace.samples().last().unwrap().state[0];
+        // The cart moves back and forth by what the steps of the encoders add.
+        let last: Vec<f64> =
+            run.trace.samples().filter(|sample| sample.t > 6.0).map(|sample| sample.state[0]).collect();
+        let cart_m = last.iter().sum::<f64>() / last.len() as f64;
         assert!((cart_m - 0.05).abs() < 0.02, "{name}: {cart_m}");
         let moves = |tick: &&upright_design::harness::FirmwareTick| tick.output.pulses() != 0;
         assert!(run.ticks.iter().filter(moves).count() > 100, "{name}");
@@ -291,7 +294,13 @@ fn a_fault_of_the_rig_brings_the_cart_to_rest_and_a_fault_of_the_drive_cuts_it()
     println!("{pulses:?}");
     let sum: i32 = pulses.iter().sum();
     assert!((4..=7).contains(&pulses.len()) && (15..35).contains(&sum.abs()), "{pulses:?}");
-    assert!(pulses.windows(2).all(|pair| pair[0].abs() > pair[1].abs()), "{pulses:?}");
+    // 1.6 pulses fewer in each tick, rounded to whole ones.
+    assert!(
+        pulses
+            .windows(2)
+            .all(|pair| (1..=2).contains(&(pair[0].abs() - pair[1].abs())) || pair[1].abs() <= 1),
+        "{pulses:?}"
+    );
 }
 
 #[test]

@@ -145,6 +145,7 @@ impl Errors {
 fn joints_that_stick_are_homed_better_while_they_swing() {
     let case = |lift_rad| Case::new("quadruple-paper", 3e-4, lift_rad);
     let (hanging, swinging) = (Errors::of(&case(HANGS), 6), Errors::of(&case(SWINGS), 6));
+    println!("let go near hanging: {hanging:?}\nswinging: {swinging:?}");
     assert!(hanging.runs == 6 && hanging.largest_rad > 0.003, "{hanging:?}");
     assert!(swinging.runs == 6 && swinging.largest_rad < 0.002 && swinging.longest_s < 30.0, "{swinging:?}");
     assert!(swinging.rms_rad < 0.4 * hanging.rms_rad, "{swinging:?} {hanging:?}");

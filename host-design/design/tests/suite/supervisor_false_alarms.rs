@@ -106,6 +106,14 @@ fn machines_at_the_corners_have_every_combination_of_wrong_masses_and_all_of_the
         assert!(masses(machine).iter().all(|percent| percent.abs() == 5.0));
         assert!(!machines[..number].contains(machine), "{number}");
     }
+    // A stepper does not feel the mass of its cart.
+    let stepper = Rig { robust: tolerating.robust.clone(), ..rig("double-stepper") };
+    let machines: Vec<Rig> = (0..4).map(|number| corner_machine(&stepper, number)).collect();
+    assert_eq!(Machines::Corners.count(&stepper), 4);
+    assert_eq!(
+        [0, 1, 2, 3].map(|number: usize| masses(&machines[number])),
+        [[0.0, -5.0, -5.0], [0.0, 5.0, -5.0], [0.0, -5.0, 5.0], [0.0, 5.0, 5.0]]
+    );
 }
 
 /// The rig file with these tolerances in place of its own.

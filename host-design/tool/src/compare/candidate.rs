@@ -101,6 +101,7 @@ fn row(
     }
     let row = ComparedRow {
         rig: candidate.label.clone(),
+        input: rig.actuator.input(),
         value: candidate.value,
         law,
         fate: Fate::Survived,

@@ -1,7 +1,7 @@
 //! A comparison as a picture.
 
 use super::candidate::ComparedRig;
-use super::row::{ComparedRow, Fate, LawFigures};
+use super::row::{ComparedRow, Fate, LawFigures, input};
 use super::sweep::Sweep;
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::rig::Rig;
@@ -50,11 +50,12 @@ fn over_key(rows: &[ComparedRow], sweep: &Sweep) -> Figure {
         ""
     };
     let mut figure = Figure::new(title);
+    let peak = format!("peak {}", input(rows));
     let panels: [(&str, FigureOf); 6] = [
         ("settled (s)", |figures| figures.settling_time_s),
         ("overshoot (%)", |figures| figures.overshoot_percent),
         ("peak angle (°)", |figures| figures.peak_angle_rad.map(f64::to_degrees)),
-        ("peak force (N)", |figures| Some(figures.peak_force_n)),
+        (&peak, |figures| Some(figures.peak_force_n)),
         ("phase margin (°)", |figures| figures.phase_margin_rad.map(f64::to_degrees)),
         ("tilt (°)", |figures| figures.tilt_rad.map(f64::to_degrees)),
     ];
@@ -95,7 +96,7 @@ fn over_time(rows: &[ComparedRow], candidates: &[ComparedRig]) -> Figure {
     let label = if all_chains { "position (m)" } else { "position (m), or output" };
     let mut position = Panel::new(time(), Axis::linear(label));
     let mut angle = Panel::new(time(), Axis::linear("largest angle (°)"));
-    let mut force = Panel::new(time(), Axis::linear("force (N)"));
+    let mut force = Panel::new(time(), Axis::linear(input(rows)));
     for (number, (name, group)) in groups(rows).into_iter().enumerate() {
         let Some(trace) = group.first().and_then(|row| row.trace.as_ref()) else { continue };
         let Some(candidate) = candidates.iter().find(|candidate| candidate.label == group[0].rig) else {

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
+use upright_design::rig::CartInput;
 use upright_design::simulate::{Fall, Trace};
 
 /// Results for one law of one candidate.
@@ -10,6 +11,8 @@ use upright_design::simulate::{Fall, Trace};
 pub struct ComparedRow {
     /// Label of the rig.
     pub rig: String,
+    /// What its drive imposes on the cart.
+    pub input: CartInput,
     /// Value of the swept key; `None` without a sweep.
     pub value: Option<f64>,
     /// The control law that was run.
@@ -21,6 +24,16 @@ pub struct ComparedRow {
     /// The run; none without a design.
     #[serde(skip)]
     pub trace: Option<Trace>,
+}
+
+/// What the drives of these rows impose on their carts, with its unit, as words.
+pub(super) fn input(rows: &[ComparedRow]) -> &'static str {
+    let has = |input: CartInput| rows.iter().any(|row| row.input == input);
+    match (has(CartInput::Force), has(CartInput::Acceleration)) {
+        (true, true) => "force (N) or acceleration (m/s²)",
+        (false, true) => "acceleration (m/s²)",
+        _ => "force (N)",
+    }
 }
 
 /// How a run ended, or why there was none.
@@ -46,7 +59,7 @@ pub struct LawFigures {
     pub overshoot_percent: Option<f64>,
     /// Largest angle of any joint (rad); none for a model.
     pub peak_angle_rad: Option<f64>,
-    /// Largest force on the cart (N).
+    /// Largest force on the cart (N), or acceleration of the cart (m/s²) where the drive imposes that.
     pub peak_force_n: f64,
     /// Smallest factor on the force at which the loop is still stable; none if it is not.
     pub lowest_gain: Option<f64>,

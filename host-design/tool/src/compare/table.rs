@@ -1,6 +1,6 @@
 //! A comparison as text and as CSV.
 
-use super::row::{ComparedRow, Fate, LawFigures};
+use super::row::{ComparedRow, Fate, LawFigures, input};
 use crate::reproduce::markdown_table;
 
 /// All rows as a Markdown table with aligned columns; `key` is the swept key. The column of rigs is left out if all
@@ -10,11 +10,12 @@ pub fn table(rows: &[ComparedRow], key: Option<&str>) -> String {
     let mut header = if several { vec!["rig", "law", "run"] } else { vec!["law", "run"] };
     let left = header.len();
     header.extend(key);
+    let peak = format!("peak {}", input(rows));
     header.extend([
         "settled (s)",
         "overshoot (%)",
         "peak angle (°)",
-        "peak force (N)",
+        &peak,
         "gain margin",
         "phase (°)",
         "delay (ms)",

@@ -52,7 +52,7 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
             format!("single-stepper: `upright {}` serves only drives that give a force", arguments[0]);
         assert!(stderr(&output).contains(&words), "{arguments:?}: {}", stderr(&output));
     };
-    for command in ["compare", "robust", "swing-up", "transitions"] {
+    for command in ["robust", "swing-up", "transitions"] {
         refused(&[command, &rig]);
     }
     refused(&["commission", &rig, "--target", "host"]);
@@ -64,7 +64,6 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
         ("faults", "--shake"),
         ("verify", "--imperfections"),
         ("report", "--imperfections"),
-        ("false-alarms", "--corners"),
     ] {
         let target = if option == "--target" { &["qemu"][..] } else { &[] };
         let output = upright(&[&[command, &rig, option], target].concat());
@@ -72,6 +71,19 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
         let words = format!("`upright {command} {option}` serves only drives that give a force");
         assert!(stderr(&output).contains(&words), "{}", stderr(&output));
     }
+}
+
+#[test]
+fn compared_steppers_have_a_largest_acceleration_and_mixed_drives_are_told_apart() {
+    let (single, motor) = (stepper(), rig_path("single-quanser-ip02").display().to_string());
+    let compared = |rigs: &[&str]| {
+        let output = upright(&[&["compare"], rigs, &["--law", "lqr", "--duration", "2"]].concat());
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        stdout(&output).lines().next().unwrap().to_owned()
+    };
+    assert!(compared(&[&single]).contains("| peak acceleration (m/s²) |"));
+    assert!(compared(&[&single, &motor]).contains("| peak force (N) or acceleration (m/s²) |"));
+    assert!(compared(&[&motor]).contains("| peak force (N) |"));
 }
 
 #[test]

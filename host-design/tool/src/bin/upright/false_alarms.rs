@@ -53,9 +53,6 @@ pub(crate) struct HealthyHoursCommand {
 impl HealthyHoursCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        if self.corners {
-            rig.refuse_acceleration("false-alarms --corners")?;
-        }
         let laws: Vec<Law> = table
             .laws
             .present()

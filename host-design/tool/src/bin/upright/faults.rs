@@ -267,14 +267,17 @@ fn text(result: &Campaign, control: Option<&Campaign>) -> String {
     };
     let head = "runs masked rejected detected late missed false allowed worst onset";
     let mut text = line("defect", head.split(' ').map(str::to_owned).collect(), "faults");
+    let counts = |row: &DefectRow| {
+        [row.runs, row.masked, row.rejected, row.detected, row.late, row.missed, row.false_alarms]
+    };
     for row in &result.rows {
-        let counts =
-            [row.runs, row.masked, row.rejected, row.detected, row.late, row.missed, row.false_alarms];
         let ticks = [row.allowed, row.worst, row.worst_from_onset];
         let ticks = ticks.map(|ticks| ticks.map_or("-".to_owned(), |ticks| ticks.to_string()));
-        let numbers = counts.map(|count| count.to_string()).into_iter().chain(ticks).collect();
+        let numbers = counts(row).map(|count| count.to_string()).into_iter().chain(ticks).collect();
         text += &line(row.kind.name(), numbers, &row.faults.join(", "));
     }
+    let sum = |column: usize| result.rows.iter().map(|row| counts(row)[column]).sum::<usize>().to_string();
+    text += &line("all", (0..7).map(sum).collect(), "");
     text.extend(result.rows.iter().filter(|row| row.kind == Defect::Push).map(pushes));
     if let Some(us) = result.rows.iter().find_map(|row| row.stop_to_off_us) {
         text += &format!("emergency stop between ticks: PWM inactive at most {us:.3} µs after the edge\n");
