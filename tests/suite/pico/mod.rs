@@ -7,6 +7,7 @@ mod recorded;
 
 use self::chip::{Answer, Chip, uf2_with_motions};
 use self::recorded::{PERIOD, Recorded, WARM_UP_TICKS, recorded};
+use crate::equipment::if_possible;
 use crate::published::{rig_and_table, rig_and_table_with_motions};
 use upright::board::Output;
 use upright::supervision::supervisor::State;
@@ -14,7 +15,7 @@ use upright::table::Law;
 use upright_design::harness::Pins;
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::up_and_down;
-use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
+use upright_tool::image::{BuildError, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, build_pico};
 
 /// Stack of the image (bytes), as `boards/rp2040/image.x` has it.
 const STACK: u32 = 8192;
@@ -151,6 +152,17 @@ fn a_changed_table_keeps_the_motor_off() {
     assert!(!telemetry.is_empty() && answers.iter().all(|answer| !answer.enabled));
     let table_fault = Some(upright::supervision::fault::Fault::Table);
     assert!(telemetry.iter().all(|at| at.fault == table_fault), "{:?}", telemetry[0].fault);
+}
+
+#[test]
+#[ignore = "builds the image"]
+fn a_rig_with_a_stepper_does_not_compile() {
+    let (rig, table) = rig_and_table("single-stepper");
+    let refused = build_pico(rig, table);
+    if let Err(BuildError::Compiler(said)) = &refused {
+        return assert!(said.contains("kind = \"acceleration\": this board makes no step pulses"), "{said}");
+    }
+    assert!(if_possible(refused, "the image for a Pico").is_none(), "it compiles");
 }
 
 /// Whether this operation in an image is the compiler's, by the names in its ELF file. The ROM's take subnormals as 0,
