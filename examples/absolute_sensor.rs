@@ -1,7 +1,7 @@
 //! A board whose link has a sensor of its absolute angle, with 14 bits per turn: `cargo run --example absolute_sensor`.
 //!
-//! Shifted until it fills 16 bits, the sensor's reading wraps as a counter of 16 bits does. In the rig file, a turn then
-//! has 65,536 counts. As with a counter, half a turn between two ticks is too much.
+//! Shifted until it fills 16 bits, the sensor's reading wraps as a counter of 16 bits does. In the rig file, a turn
+//! then has 65,536 counts. As with a counter, half a turn between two ticks is too much.
 
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::{CounterWidth, Encoders};
