@@ -3,6 +3,7 @@
 
 mod bench;
 mod c_header;
+mod c_library;
 mod chips;
 mod closed_loop;
 mod encoders_only;

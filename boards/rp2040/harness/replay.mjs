@@ -2,7 +2,8 @@
 //
 // Each line of TICKS is a JSON object: `counts`, the contacts as `Pico.contacts` takes them, `supply` (steps of the
 // converter), `received` (bytes in hexadecimal). Or it is {"stopTicks": CYCLES}: ticks stop, and the answer says when the
-// power stage was disabled, and when the watchdog would have reset the chip. Each answer is a JSON object, too.
+// power stage was disabled, and when the watchdog would have reset the chip. Or {"openStop": CYCLES}: the emergency stop
+// opens between two ticks, and the answer says when the power stage was disabled. Each answer is a JSON object, too.
 
 import { createInterface } from 'node:readline';
 import { Pico } from './chip.mjs';
@@ -31,11 +32,24 @@ function stopTicks(limit) {
   return stopped;
 }
 
+/** The emergency stop opens: the cycles until the power stage is off; null if it stays on. */
+function openStop(limit) {
+  const begin = pico.clock.nanos;
+  const cycles = () => Math.round((pico.clock.nanos - begin) / 8);
+  pico.contacts({ stop: true });
+  while (pico.outputs().enabled && cycles() < limit) pico.step();
+  return { disabled: pico.outputs().enabled ? null : cycles() };
+}
+
 for await (const line of createInterface({ input: process.stdin })) {
   const tick = JSON.parse(line);
   if (tick.stopTicks) {
     console.log(JSON.stringify(stopTicks(tick.stopTicks)));
     break;
+  }
+  if (tick.openStop) {
+    console.log(JSON.stringify(openStop(tick.openStop)));
+    continue;
   }
   // The chip counts from 0.
   first ??= tick.counts;

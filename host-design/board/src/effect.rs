@@ -20,10 +20,13 @@ pub enum Effect {
     JumpTo(u8),
     /// This register becomes an address near the instruction, such as that of a branch table.
     Near(u8),
-    /// The first register becomes the second plus another: an entry of a table, if the second is the table's address.
+    /// The first register becomes the second plus another, or the word there: an entry of a table, if the second is
+    /// the table's address.
     Indexed(u8, u8),
     /// This register becomes the word at this address.
     Literal(u8, u32),
+    /// The stack pointer moves by this register's value.
+    Moved(u8),
     /// The stack pointer becomes this register's value.
     FromRegister(u8),
     /// This register is rounded down to a multiple of this many bytes.
@@ -56,6 +59,7 @@ pub fn effect(address: u32, first: u16, second: u16) -> Effect {
             Effect::Grow(u32::from(offset.min(0).unsigned_abs()))
         }
         Op::Load { rt: PC, rn, .. } if rn != SP => Effect::Indirect,
+        Op::Load { rt, rn, place: Addressing::Indexed { .. }, .. } => Effect::Indexed(rt, rn),
         Op::LoadLiteral { rt: PC, .. } => Effect::Indirect,
         Op::LoadLiteral { rt, address, .. } => Effect::Literal(rt, address),
         Op::InsertField { rd, rn: PC, lsb: 0, width } => Effect::Aligned(rd, 1 << width),
@@ -70,11 +74,13 @@ pub fn effect(address: u32, first: u16, second: u16) -> Effect {
 /// The effect of data processing whose result becomes `rd`.
 fn of_result(address: u32, alu: Alu, rd: u8, rn: u8, operand: Operand) -> Effect {
     match (alu, rd, operand) {
-        (Alu::Mov, PC, Operand::Register(rm)) => Effect::JumpTo(rm),
+        (Alu::Mov | Alu::Add, PC, Operand::Register(rm)) => Effect::JumpTo(rm),
         (_, PC, _) => Effect::Indirect,
         (Alu::Mov, SP, Operand::Register(rm)) => Effect::FromRegister(rm),
         (Alu::Sub, SP, Operand::Constant(bytes) | Operand::Rotated(bytes)) => Effect::Grow(bytes),
         (Alu::Sub, SP, _) => Effect::Unknown,
+        (Alu::Add, SP, Operand::Register(rm)) => Effect::Moved(rm),
+        (Alu::Add, _, Operand::Register(PC)) => Effect::Near(rd),
         (Alu::Sub, _, Operand::Constant(_) | Operand::Rotated(_)) if rn == FRAME => Effect::FromFrame(rd),
         (Alu::Mov, _, Operand::Constant(value)) if value.abs_diff(address) <= NEAR => Effect::Near(rd),
         (Alu::Add, _, Operand::Register(_) | Operand::Shifted { .. }) if rd != SP => Effect::Indexed(rd, rn),
@@ -115,6 +121,10 @@ mod tests {
         ("bx r3", 0x4718, 0x0000, Effect::Indirect),
         ("blx r3", 0x4798, 0x0000, Effect::Indirect),
         ("mov pc, r3", 0x469F, 0x0000, Effect::JumpTo(3)),
+        ("add pc, r3", 0x449F, 0x0000, Effect::JumpTo(3)),
+        ("add r2, pc", 0x447A, 0x0000, Effect::Near(2)),
+        ("ldr r0, [r4, r0]", 0x5820, 0x0000, Effect::Indexed(0, 4)),
+        ("add sp, r6", 0x44B5, 0x0000, Effect::Moved(6)),
         ("adr.w r6, #8", 0xF20F, 0x0608, Effect::Near(6)),
         ("add.w r6, r1, r10, lsl #2", 0xEB01, 0x068A, Effect::Indexed(6, 1)),
         ("adr r3, #8", 0xA302, 0x0000, Effect::Near(3)),

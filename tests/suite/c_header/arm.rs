@@ -37,7 +37,7 @@ const MACHINES: [Machine; 4] = [
 ];
 
 /// Whether compiler and emulator can be started.
-fn can_run() -> bool {
+pub(crate) fn can_run() -> bool {
     let has_library = || {
         let file = Command::new("arm-none-eabi-gcc").arg("-print-file-name=rdimon.specs").output().unwrap();
         let is_there = String::from_utf8_lossy(&file.stdout).contains('/');

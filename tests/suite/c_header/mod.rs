@@ -9,6 +9,7 @@ mod program;
 mod recorded;
 mod steps;
 
+pub(crate) use arm::can_run as can_run_on_cortex_m;
 use program::{Dialect, Program, is_there, replayed};
 use recorded::{BALANCING, ControllerTick, Defect, FAULT, FirmwareRun, recorded, scenario};
 

@@ -7,7 +7,7 @@ use super::recorded::Replay;
 use crate::published::rig_and_table_with_motions;
 use upright_design::table::gains_source;
 use upright_test_support::repository;
-use upright_tool::image::{BuildError, Compiler, compiler_for_chips};
+use upright_tool::image::{BuildError, Compiler, PROFILE, compiler_for_chips};
 
 /// An instruction set, and a machine of QEMU that has it.
 pub(super) struct Machine {
@@ -15,6 +15,8 @@ pub(super) struct Machine {
     /// The machine.
     pub(super) name: &'static str,
     options: &'static [&'static str],
+    /// It has no atomic instructions: the image has the feature `single-core`.
+    is_without_atomics: bool,
     /// Nanoseconds per count of the image's clock. An instruction takes [`INSTRUCTION_NS`].
     clock_ns: f64,
 }
@@ -22,15 +24,27 @@ pub(super) struct Machine {
 /// One instruction takes 2⁶ ns of the emulator's time.
 const INSTRUCTION_NS: f64 = 64.0;
 
-pub(super) const MACHINES: [Machine; 5] = [
-    Machine { target: "thumbv6m-none-eabi", name: "microbit", options: &[], clock_ns: 62.5 },
-    Machine { target: "thumbv7m-none-eabi", name: "mps2-an385", options: &[], clock_ns: 40.0 },
-    Machine { target: "thumbv7em-none-eabihf", name: "mps2-an386", options: &[], clock_ns: 40.0 },
-    Machine { target: "thumbv8m.main-none-eabihf", name: "mps2-an505", options: &[], clock_ns: 50.0 },
+const fn arm(target: &'static str, name: &'static str, clock_ns: f64) -> Machine {
+    Machine { target, name, options: &[], is_without_atomics: false, clock_ns }
+}
+
+pub(super) const MACHINES: [Machine; 6] = [
+    arm("thumbv6m-none-eabi", "microbit", 62.5),
+    arm("thumbv7m-none-eabi", "mps2-an385", 40.0),
+    arm("thumbv7em-none-eabihf", "mps2-an386", 40.0),
+    arm("thumbv8m.main-none-eabihf", "mps2-an505", 50.0),
     Machine {
         target: "riscv32imac-unknown-none-elf",
         name: "virt",
         options: &["-bios", "none", "-cpu", "rv32,f=off,d=off"],
+        is_without_atomics: false,
+        clock_ns: 1.0,
+    },
+    Machine {
+        target: "riscv32imc-unknown-none-elf",
+        name: "virt",
+        options: &["-bios", "none", "-cpu", "rv32,a=off,f=off,d=off"],
+        is_without_atomics: true,
         clock_ns: 1.0,
     },
 ];
@@ -44,7 +58,7 @@ pub(super) const FLUSHED: u8 = 2;
 pub(super) struct Image {
     pub(super) machine: &'static Machine,
     path: PathBuf,
-    folder: tempfile::TempDir,
+    _folder: tempfile::TempDir,
 }
 
 /// What an image has done.
@@ -56,15 +70,19 @@ pub(super) struct Replayed {
     pub(super) most: f64,
 }
 
-/// The images for all machines, built by one call of cargo.
+/// The images for all machines. One call of cargo builds those with the same features.
 pub(super) fn images() -> Result<Vec<Image>, BuildError> {
-    let target_directory = compile("build", &MACHINES.each_ref().map(|machine| machine.target), &[])?;
+    let (without_atomics, others): (Vec<_>, Vec<_>) =
+        MACHINES.iter().partition(|machine| machine.is_without_atomics);
+    let target_directory = compile("build", &others, &[])?;
+    compile("build", &without_atomics, &["--features", "single-core"])?;
     Ok(MACHINES.iter().map(|machine| Image::copied(machine, &target_directory)).collect())
 }
 
 /// Calls cargo; returns the directory into which it builds.
-fn compile(subcommand: &str, targets: &[&str], for_rustc: &[&str]) -> Result<PathBuf, BuildError> {
-    let Compiler { mut cargo, target_directory, .. } = compiler_for_chips(targets)?;
+fn compile(subcommand: &str, machines: &[&Machine], arguments: &[&str]) -> Result<PathBuf, BuildError> {
+    let targets: Vec<&str> = machines.iter().map(|machine| machine.target).collect();
+    let Compiler { mut cargo, target_directory, .. } = compiler_for_chips(&targets)?;
     for (variable, rig) in
         [("UPRIGHT_QUADRUPLE", "quadruple-paper"), ("UPRIGHT_SINGLE", "single-quanser-ip02")]
     {
@@ -79,9 +97,9 @@ fn compile(subcommand: &str, targets: &[&str], for_rustc: &[&str]) -> Result<Pat
         cargo.env(variable, path);
     }
     // Outside the repository: its settings are for the images of boards.
-    cargo.current_dir(std::env::temp_dir()).args([subcommand, "--quiet", "--release", "--manifest-path"]);
-    cargo.arg(repository().join("boards/replay/Cargo.toml"));
-    cargo.args(targets.iter().flat_map(|target| ["--target", target])).args(for_rustc);
+    cargo.current_dir(std::env::temp_dir()).args([subcommand, "--quiet", "--locked", "--profile", PROFILE]);
+    cargo.arg("--manifest-path").arg(repository().join("boards/replay/Cargo.toml"));
+    cargo.args(targets.iter().flat_map(|target| ["--target", target])).args(arguments);
     let output = cargo.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Ok(target_directory)
@@ -92,31 +110,31 @@ impl Image {
     fn copied(machine: &'static Machine, target_directory: &Path) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("image");
-        let built = target_directory.join(machine.target).join("release/upright-replay");
+        let built = target_directory.join(machine.target).join(PROFILE).join("upright-replay");
         std::fs::copy(&built, &path).unwrap_or_else(|error| panic!("{}: {error}", built.display()));
-        Self { machine, path, folder }
+        Self { machine, path, _folder: folder }
     }
 
     /// The image in which the compiler may fuse products and sums. It does so when it generates code, which is with the
     /// last crate.
     pub(super) fn fused(machine: &'static Machine) -> Result<Self, BuildError> {
         let fuse = ["--", "-C", "llvm-args=-fp-contract=fast"];
-        let target_directory = compile("rustc", &[machine.target], &fuse)?;
+        let target_directory = compile("rustc", &[machine], &fuse)?;
         Ok(Self::copied(machine, &target_directory))
     }
 
     /// Runs the image with the recorded pins; `selection` adds bits to the first byte.
     pub(super) fn replay(&self, replay: &Replay, selection: u8) -> Replayed {
-        let file = |name: &str| self.folder.path().join(name);
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
         let input = [&[replay.selection | selection], replay.input.as_slice()].concat();
         std::fs::write(file("replay.in"), input).unwrap();
-        let _ = std::fs::remove_file(file("replay.out"));
         let program = if self.machine.name == "virt" { "qemu-system-riscv32" } else { "qemu-system-arm" };
         let mut qemu = Command::new(program);
         qemu.args(["-M", self.machine.name, "-nographic", "-monitor", "none", "-serial", "none"]);
         qemu.args(self.machine.options).args(["-icount", "shift=6,sleep=off"]);
         qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(&self.path);
-        let output = qemu.current_dir(self.folder.path()).stdin(Stdio::null()).output().unwrap();
+        let output = qemu.current_dir(folder.path()).stdin(Stdio::null()).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{} on {}: {said}", replay.name, self.machine.target);
         self.replayed(std::fs::read(file("replay.out")).unwrap())

@@ -1,4 +1,4 @@
-//! One set of bits: recorded runs of the firmware are replayed by an image on five instruction sets in QEMU.
+//! One set of bits: recorded runs of the firmware are replayed by an image on six instruction sets in QEMU.
 //!
 //! The compiler builds Rust's core library for each of them, so this takes minutes: it runs with `--ignored`.
 
@@ -7,12 +7,47 @@ mod recorded;
 
 use std::fmt::Write;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use self::image::{FLUSHED, Image, MACHINES, Machine, Replayed, images};
-use self::recorded::{Replay, at_rest, runs};
+use self::recorded::{Replay, runs};
 use crate::equipment::if_possible;
 use upright_test_support::equipment::{is_required, not_exercised};
 use upright_test_support::repository;
+
+/// The images and the runs, if compiler and emulators are there: for all tests, and the runs are recorded while the
+/// images are compiled.
+fn prepared() -> Option<&'static (Vec<Image>, Vec<Replay>)> {
+    static PREPARED: OnceLock<Option<(Vec<Image>, Vec<Replay>)>> = OnceLock::new();
+    let prepare = || {
+        std::thread::scope(|scope| {
+            let runs = scope.spawn(runs);
+            let images = images_if_possible()?;
+            Some((images, runs.join().unwrap()))
+        })
+    };
+    PREPARED.get_or_init(prepare).as_ref()
+}
+
+/// What each image does in each run, in this order, with an emulator on each core.
+fn replayed(images: &[Image], runs: &[Replay]) -> Vec<Replayed> {
+    let pairs: Vec<_> = images.iter().flat_map(|image| runs.iter().map(move |run| (image, run))).collect();
+    let workers = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    let share = |worker: usize| {
+        pairs
+            .iter()
+            .skip(worker)
+            .step_by(workers)
+            .map(|(image, run)| image.replay(run, 0))
+            .collect::<Vec<_>>()
+    };
+    let shares: Vec<Vec<Replayed>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|worker| scope.spawn(move || share(worker))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    let mut shares: Vec<_> = shares.into_iter().map(Vec::into_iter).collect();
+    (0..pairs.len()).filter_map(|place| shares[place % workers].next()).collect()
+}
 
 /// The images, if compiler and emulators are there.
 fn images_if_possible() -> Option<Vec<Image>> {
@@ -44,14 +79,13 @@ struct Instructions {
 }
 
 #[test]
-#[ignore = "builds for five instruction sets"]
-fn five_instruction_sets_give_the_bits_of_the_host() {
-    let Some(images) = images_if_possible() else { return };
-    let runs = runs();
-    let mut measured = Vec::new();
-    for image in &images {
-        for replay in &runs {
-            let replayed = image.replay(replay, 0);
+#[ignore = "builds for six instruction sets"]
+fn six_instruction_sets_give_the_bits_of_the_host() {
+    let Some((images, runs)) = prepared() else { return };
+    let (mut measured, mut replayed) = (Vec::new(), replayed(images, runs).into_iter());
+    for image in images {
+        for replay in runs {
+            let replayed = replayed.next().unwrap();
             let different = first_difference(replay, &replayed);
             assert_eq!(different, None, "{} on {}: first different tick", replay.name, image.machine.target);
             let target = image.machine.target;
@@ -72,20 +106,19 @@ fn five_instruction_sets_give_the_bits_of_the_host() {
 }
 
 #[test]
-#[ignore = "builds for five instruction sets"]
+#[ignore = "builds for six instruction sets"]
 fn fused_products_and_flushed_subnormals_are_noticed() {
-    let Some(images) = images_if_possible() else { return };
+    let Some((images, runs)) = prepared() else { return };
     let with_unit = |image: &&Image| image.machine.name == "mps2-an386";
     let image = images.iter().find(with_unit).unwrap();
     let fused = if_possible(Image::fused(image.machine), "the image with fused products").unwrap();
-    let runs = runs();
-    for replay in &runs {
+    for replay in runs {
         let different = first_difference(replay, &fused.replay(replay, 0));
         println!("fused: {} differs from tick {different:?}", replay.name);
         assert!(different.is_some(), "fused products are not noticed in {}", replay.name);
     }
-    for replay in [at_rest("single-quanser-ip02"), at_rest("quadruple-paper")] {
-        let different = first_difference(&replay, &image.replay(&replay, FLUSHED));
+    for replay in runs.iter().filter(|run| run.name.ends_with("at rest")) {
+        let different = first_difference(replay, &image.replay(replay, FLUSHED));
         println!("flushed: {} differs from tick {different:?} of {}", replay.name, replay.ends.len());
         assert!(different.is_some(), "flushed subnormals are not noticed in {}", replay.name);
     }

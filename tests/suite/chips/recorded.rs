@@ -107,7 +107,7 @@ const KICK: usize = 5;
 
 /// The firmware balances, a link's counter is one count off in one tick, and then all counters stand still: estimates
 /// and outputs decay until they are subnormal.
-pub(super) fn at_rest(rig: &'static str) -> Replay {
+fn at_rest(rig: &'static str) -> Replay {
     let (rig, table) = rig_and_table_with_motions(rig);
     let name = if table.sensors() == 2 { "one link at rest" } else { "four links at rest" };
     recorded(name, table, |tap| stand_still(rig, table, tap))

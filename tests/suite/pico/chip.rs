@@ -65,6 +65,16 @@ impl Chip {
 
     /// Runs the ticks of a recorded run.
     pub(super) fn replay(&mut self, run: &Recorded) -> Vec<Answer> {
+        self.replay_and(run, run.pins.len(), |_| ())
+    }
+
+    /// The same; acts before one of the ticks.
+    pub(super) fn replay_and(
+        &mut self,
+        run: &Recorded,
+        at: usize,
+        mut act: impl FnMut(&mut Self),
+    ) -> Vec<Answer> {
         let hexadecimal =
             |bytes: &[u8]| bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
         // The host's counters have 32 and 16 bits, the chip's have 32.
@@ -91,7 +101,19 @@ impl Chip {
             })
         });
         let ticks: Vec<Value> = ticks.collect();
-        ticks.iter().map(|tick| answer(&self.ask(tick))).collect()
+        let answers = ticks.iter().enumerate().map(|(number, tick)| {
+            if number == at {
+                act(self);
+            }
+            answer(&self.ask(tick))
+        });
+        answers.collect()
+    }
+
+    /// Opens the emergency stop; returns the cycles until the power stage is disabled.
+    pub(super) fn open_stop(&mut self, limit: u32) -> u32 {
+        let opened = self.ask(&json!({ "openStop": limit }));
+        opened["disabled"].as_u64().unwrap_or_else(|| panic!("{opened}")) as u32
     }
 
     /// Stops the chip's ticks; returns the cycles until the power stage is disabled, and until the watchdog resets the

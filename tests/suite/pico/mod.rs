@@ -3,10 +3,11 @@
 //! It needs node and the emulator (`npm ci` in `boards/rp2040/harness`), and takes a minute: it runs with `--ignored`.
 
 mod chip;
-mod recorded;
+pub(crate) mod recorded;
 
 use self::chip::{Answer, Chip, uf2_with_motions};
 use self::recorded::{PERIOD, Recorded, WARM_UP_TICKS, recorded};
+use crate::equipment::if_possible;
 use crate::published::{rig_and_table, rig_and_table_with_motions};
 use upright::board::Output;
 use upright::supervision::supervisor::State;
@@ -14,7 +15,7 @@ use upright::table::Law;
 use upright_design::harness::Pins;
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::up_and_down;
-use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
+use upright_tool::image::{BuildError, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, build_pico};
 
 /// Stack of the image (bytes), as `boards/rp2040/image.x` has it.
 const STACK: u32 = 8192;
@@ -86,21 +87,55 @@ fn one_link_is_raised_and_balanced_until_the_emergency_stop() {
     assert!(first_difference(&run, &answers).is_some());
 }
 
-#[test]
-#[ignore = "runs an emulator of the chip"]
-fn a_flood_on_the_bus_disturbs_nothing_and_the_motor_goes_off_when_ticks_stop() {
-    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
-    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+/// Fills the line with noise.
+fn flood() -> impl FnMut(&mut Pins) {
     let mut number = 1_u8;
-    let flood = move |pins: &mut Pins| {
+    move |pins| {
         while pins.received.len() < 60 {
             number = number.wrapping_mul(5).wrapping_add(3);
             let _ = pins.received.push(number | 1);
         }
         // The next command begins after the end of a frame.
         let _ = pins.received.push(0);
+    }
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn the_emergency_stop_turns_the_motor_off_in_a_flood_on_the_bus() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let scenario = by_hand(rig, 0.2);
+    let plain = recorded(rig, table, &scenario, Some((State::Jogging, 0, flood())));
+    let first = plain.pins.iter().position(|pins| pins.received.len() > 60).unwrap();
+    let pressed = plain.last_on() - 10;
+    let (mut flood, mut left) = (flood(), pressed - first);
+    let flood_and_stop = move |pins: &mut Pins| {
+        flood(pins);
+        pins.contacts.emergency_stop |= left == 0;
+        left = left.saturating_sub(1);
     };
-    let mut run = recorded(rig, table, &by_hand(rig, 0.4), Some((State::Jogging, 0, flood)));
+    let mut run = recorded(rig, table, &scenario, Some((State::Jogging, 0, flood_and_stop)));
+    run.truncate(pressed + 10);
+    let is_on = |tick: usize| run.outputs[tick].enable;
+    assert!(
+        is_on(pressed - 1) && !is_on(pressed),
+        "the firmware does not stop in the tick in which it is told to"
+    );
+    let (mut chip, mut cycles) = (Chip::start(&uf2, table.sensors()), 0);
+    // It opens after a tick, long before the next one: no code turns the motor off.
+    let answers = chip.replay_and(&run, pressed, |chip| cycles = chip.open_stop(10_000));
+    assert_equal(&run, &answers);
+    println!("emergency stop: disabled after {cycles} cycles");
+    assert!((1..=250).contains(&cycles), "{cycles} cycles");
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn a_flood_on_the_bus_disturbs_nothing_and_the_motor_goes_off_when_ticks_stop() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let mut run = recorded(rig, table, &by_hand(rig, 0.4), Some((State::Jogging, 0, flood())));
     run.truncate(run.last_on() - 10);
     assert_eq!(run.last_state(), State::Balancing, "no command got through");
     let mut chip = Chip::start(&uf2, table.sensors());
@@ -151,6 +186,17 @@ fn a_changed_table_keeps_the_motor_off() {
     assert!(!telemetry.is_empty() && answers.iter().all(|answer| !answer.enabled));
     let table_fault = Some(upright::supervision::fault::Fault::Table);
     assert!(telemetry.iter().all(|at| at.fault == table_fault), "{:?}", telemetry[0].fault);
+}
+
+#[test]
+#[ignore = "builds the image"]
+fn a_rig_with_a_stepper_does_not_compile() {
+    let (rig, table) = rig_and_table("single-stepper");
+    let refused = build_pico(rig, table);
+    if let Err(BuildError::Compiler(said)) = &refused {
+        return assert!(said.contains("kind = \"acceleration\": this board makes no step pulses"), "{said}");
+    }
+    assert!(if_possible(refused, "the image for a Pico").is_none(), "it compiles");
 }
 
 /// Whether this operation in an image is the compiler's, by the names in its ELF file. The ROM's take subnormals as 0,

@@ -11,40 +11,40 @@ use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
 /// Clocks of a PWM period of the chip.
-pub(super) const PERIOD: u32 = 6250;
+pub(crate) const PERIOD: u32 = 6250;
 /// Ticks before the host sends anything: the chip is made known to the bus.
-pub(super) const WARM_UP_TICKS: usize = 60;
+pub(crate) const WARM_UP_TICKS: usize = 60;
 /// Volts of the supply per step of the chip's converter.
 const VOLTS_PER_STEP: f32 = 3.3 * 11.0 / 4096.0;
 
 /// A recorded run.
-pub(super) struct Recorded {
-    pub(super) pins: Vec<Pins>,
-    pub(super) outputs: Vec<Output>,
+pub(crate) struct Recorded {
+    pub(crate) pins: Vec<Pins>,
+    pub(crate) outputs: Vec<Output>,
     /// What the firmware has sent, by the tick in which it had been sent.
-    pub(super) sent: Vec<Vec<u8>>,
+    pub(crate) sent: Vec<Vec<u8>>,
 }
 
 impl Recorded {
     /// Leaves out what comes 50 ticks after the motor has gone off for good.
-    pub(super) fn cut_after_stop(&mut self) {
+    pub(crate) fn cut_after_stop(&mut self) {
         self.truncate(self.last_on() + 50);
     }
 
     /// The last tick with the motor on.
-    pub(super) fn last_on(&self) -> usize {
+    pub(crate) fn last_on(&self) -> usize {
         self.outputs.iter().rposition(|output| output.enable).unwrap()
     }
 
     /// Leaves out everything from a tick on.
-    pub(super) fn truncate(&mut self, ticks: usize) {
+    pub(crate) fn truncate(&mut self, ticks: usize) {
         self.pins.truncate(ticks);
         self.outputs.truncate(ticks);
         self.sent.truncate(ticks);
     }
 
     /// The state in the last telemetry.
-    pub(super) fn last_state(&self) -> State {
+    pub(crate) fn last_state(&self) -> State {
         telemetry(&self.sent.concat()).last().unwrap().state
     }
 }
@@ -90,12 +90,12 @@ impl<D: FnMut(&mut Pins)> Target for Tap<'_, D> {
 }
 
 /// What the chip's converter reads at this voltage.
-pub(super) fn steps(supply_v: f32) -> u32 {
+pub(crate) fn steps(supply_v: f32) -> u32 {
     (supply_v / VOLTS_PER_STEP).round() as u32
 }
 
 /// Records a scenario; the defect begins that many ticks after the first one in a state.
-pub(super) fn recorded<D: FnMut(&mut Pins)>(
+pub(crate) fn recorded<D: FnMut(&mut Pins)>(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,
@@ -117,7 +117,7 @@ pub(super) fn recorded<D: FnMut(&mut Pins)>(
 }
 
 /// The telemetry in what was sent, without the cycles, which the host does not count.
-pub(super) fn telemetry(sent: &[u8]) -> Vec<AnyTelemetry> {
+pub(crate) fn telemetry(sent: &[u8]) -> Vec<AnyTelemetry> {
     let mut client = Client::default();
     let messages = sent.iter().filter_map(|&byte| client.receive(byte, Duration::ZERO));
     let telemetry = messages.filter_map(|message| match message {

@@ -38,9 +38,42 @@ pub enum ElfError {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LinkedSection {
     pub(crate) name: String,
+    pub(crate) address: u32,
     pub(crate) bytes: u32,
     pub(crate) in_flash: bool,
     pub(crate) in_ram: bool,
+}
+
+/// The microcontroller of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ImageChip {
+    /// Code and constants stay in flash.
+    F4,
+    /// Code and constants are copied into RAM.
+    Rp2040,
+}
+
+impl ImageChip {
+    /// Each of its images has a second stage of the boot loader, no other image does.
+    fn of(elf: &ElfFile32) -> Self {
+        if elf.section_by_name(".boot2").is_some() { Self::Rp2040 } else { Self::F4 }
+    }
+
+    fn flash(self) -> std::ops::Range<u64> {
+        match self {
+            Self::F4 => 0x0800_0000..0x1000_0000,
+            Self::Rp2040 => 0x1000_0000..0x1020_0000,
+        }
+    }
+
+    /// Largest frame that the processor stacks at exception entry (bytes): 8 words and one for alignment (Armv6-M
+    /// Architecture Reference Manual, B1.5.6), and 18 of the floating-point unit (Armv7-M, B1.5.7).
+    pub(crate) fn exception_frame(self) -> u32 {
+        match self {
+            Self::F4 => 108,
+            Self::Rp2040 => 36,
+        }
+    }
 }
 
 /// A function, or a variable or constant.
@@ -69,7 +102,9 @@ pub struct LinkedImage {
     pub(crate) data: Vec<Item>,
     /// `(address, instructions follow)`, by address: the mapping symbols `$t` and `$d` of the Arm ELF specification.
     mapping: Vec<(u32, bool)>,
-    text: (u32, Vec<u8>),
+    /// Sections of code: their addresses and bytes.
+    code: Vec<(u32, Vec<u8>)>,
+    pub(crate) chip: ImageChip,
     /// Handlers by their number in the vector table, from 1 (reset).
     pub(crate) vectors: Vec<(usize, u32)>,
     /// Where the stack begins, and how many bytes memory.x reserves for it.
@@ -88,19 +123,12 @@ impl LinkedImage {
         let missing = |what| ElfError::Missing { path: path.to_owned(), what };
         let elf: ElfFile32 = ElfFile32::parse(&bytes[..]).map_err(format)?;
 
-        let sections = sections(&elf).map_err(format)?;
-        let text = elf.section_by_name(".text").ok_or_else(|| missing("section .text"))?;
-        let text = (text.address() as u32, text.data().map_err(format)?.to_vec());
+        let chip = ImageChip::of(&elf);
+        let sections = sections(&elf, chip).map_err(format)?;
+        let code = code_sections(&elf).map_err(format)?;
+        code.first().ok_or_else(|| missing("section of code"))?;
         let table = elf.section_by_name(".vector_table").ok_or_else(|| missing("section .vector_table"))?;
-        let (words, _) = table.data().map_err(format)?.as_chunks::<4>();
-        let vectors: Vec<_> = words
-            .iter()
-            .map(|word| u32::from_le_bytes(*word))
-            .enumerate()
-            .skip(1)
-            .filter(|(_, word)| *word != 0)
-            .map(|(number, word)| (number, word & !1))
-            .collect();
+        let vectors = handlers(table.data().map_err(format)?);
 
         let (mut functions, mut data, mut mapping) = (Vec::new(), Vec::new(), Vec::new());
         let (mut stack_start, mut stack_end) = (None, None);
@@ -127,21 +155,32 @@ impl LinkedImage {
             _ => return Err(missing("symbols _stack_start above _stack_end")),
         };
         mapping.sort_unstable();
-        let end = text.0 + text.1.len() as u32;
-        let functions = without_aliases(functions, end);
+        let functions = without_aliases(functions, &code);
         let data = without_overlap(data);
-        Ok(Self { sections, functions, data, mapping, text, vectors, stack_start, stack_reserved, bytes })
+        Ok(Self {
+            sections,
+            functions,
+            data,
+            mapping,
+            code,
+            chip,
+            vectors,
+            stack_start,
+            stack_reserved,
+            bytes,
+        })
     }
 
     /// The machine code of a function.
     pub(crate) fn code(&self, function: &Item) -> Vec<Code> {
-        let (base, text) = &self.text;
+        let Some((base, text)) = code_at(&self.code, function.address) else { return Vec::new() };
+        let end = base + text.len() as u32;
         let mut pieces: Vec<Code> = Vec::new();
         let mut address = function.address;
         while address < function.address + function.size {
             let marks = self.mapping.partition_point(|(mark, _)| *mark <= address);
             let next = self.mapping.get(marks).map_or(u32::MAX, |(mark, _)| *mark);
-            let end = next.min(function.address + function.size);
+            let end = next.min(function.address + function.size).min(end);
             // Bytes that no mapping symbol precedes are code: some assemblers emit none.
             if marks == 0 || self.mapping[marks - 1].1 {
                 let from = (address - base) as usize;
@@ -154,10 +193,18 @@ impl LinkedImage {
         pieces
     }
 
+    /// The section that an address is in.
+    pub(crate) fn section_at(&self, address: u32) -> Option<&LinkedSection> {
+        let contains =
+            |section: &&LinkedSection| (section.address..section.address + section.bytes).contains(&address);
+        self.sections.iter().find(contains)
+    }
+
     /// The word at an address in the code section, such as a constant between instructions.
     pub(crate) fn word_in_code(&self, address: u32) -> Option<u32> {
-        let at = address.checked_sub(self.text.0)? as usize;
-        let bytes = self.text.1.get(at..at + 4)?;
+        let (base, text) = code_at(&self.code, address)?;
+        let at = (address - base) as usize;
+        let bytes = text.get(at..at + 4)?;
         bytes.try_into().ok().map(u32::from_le_bytes)
     }
 
@@ -170,19 +217,41 @@ impl LinkedImage {
     }
 }
 
+/// The handlers in a vector table: number and address.
+fn handlers(table: &[u8]) -> Vec<(usize, u32)> {
+    let (words, _) = table.as_chunks::<4>();
+    let words = words.iter().map(|word| u32::from_le_bytes(*word)).enumerate().skip(1);
+    words.filter(|(_, word)| *word != 0).map(|(number, word)| (number, word & !1)).collect()
+}
+
+/// Addresses and bytes of the sections of code.
+fn code_sections(elf: &ElfFile32) -> Result<Vec<(u32, Vec<u8>)>, object::Error> {
+    let code = elf.sections().filter(|section| section.kind() == SectionKind::Text);
+    code.map(|section| Ok((section.address() as u32, section.data()?.to_vec()))).collect()
+}
+
+/// The section of code that an address is in.
+fn code_at(code: &[(u32, Vec<u8>)], address: u32) -> Option<(u32, &[u8])> {
+    let contains = |(base, bytes): &&(u32, Vec<u8>)| {
+        address.checked_sub(*base).is_some_and(|at| (at as usize) < bytes.len())
+    };
+    code.iter().find(contains).map(|(base, bytes)| (*base, bytes.as_slice()))
+}
+
 /// The sections that are loaded or cleared.
-fn sections(elf: &ElfFile32) -> Result<Vec<LinkedSection>, object::Error> {
+fn sections(elf: &ElfFile32, chip: ImageChip) -> Result<Vec<LinkedSection>, object::Error> {
     let mut sections = Vec::new();
     for section in elf.sections() {
         let (name, address) = (section.name()?, section.address());
         if address == 0 || section.size() == 0 {
             continue; // debugging information
         }
-        let in_ram = !(0x0800_0000..0x1000_0000).contains(&address);
+        let in_ram = !chip.flash().contains(&address);
         let in_flash = section.kind() != SectionKind::UninitializedData
             && section.file_range().is_some_and(|(_, size)| size > 0);
         sections.push(LinkedSection {
             name: name.to_owned(),
+            address: address as u32,
             bytes: section.size() as u32,
             in_flash,
             in_ram,
@@ -206,13 +275,16 @@ fn without_overlap(mut data: Vec<Item>) -> Vec<Item> {
 }
 
 /// Keeps one name for each address, if possible one with a size; a function without a size, from assembly, extends to
-/// the next function.
-fn without_aliases(mut functions: Vec<Item>, end: u32) -> Vec<Item> {
+/// the next function, or to the end of its section.
+fn without_aliases(mut functions: Vec<Item>, code: &[(u32, Vec<u8>)]) -> Vec<Item> {
+    functions.retain(|function| code_at(code, function.address).is_some());
     functions.sort_by_key(|function| (function.address, std::cmp::Reverse(function.size)));
     functions.dedup_by_key(|function| function.address);
     for index in 0..functions.len() {
-        let next = functions.get(index + 1).map_or(end, |next| next.address);
+        let next = functions.get(index + 1).map_or(u32::MAX, |next| next.address);
         let function = &mut functions[index];
+        let end = code_at(code, function.address).map_or(next, |(base, bytes)| base + bytes.len() as u32);
+        let next = next.min(end);
         if function.size == 0 {
             function.size = next.saturating_sub(function.address);
         }

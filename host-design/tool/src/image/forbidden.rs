@@ -1,6 +1,7 @@
 //! Check that an image for a board contains no code that panics or allocates.
 
-use super::elf::LinkedImage;
+use super::elf::{ImageChip, LinkedImage};
+use super::stack::{StackError, reached_by_handlers};
 
 /// Parts of the names of functions that only a panic, its message or an allocation brings into an image.
 const FORBIDDEN: [&str; 9] = [
@@ -21,6 +22,27 @@ const FORBIDDEN: [&str; 9] = [
 pub fn forbidden_functions(image: &LinkedImage) -> Vec<&str> {
     let names = image.functions.iter().map(|function| function.name.as_str());
     names.filter(|name| is_forbidden(name)).collect()
+}
+
+/// Those of [`forbidden_functions`] that must not be in this image: all, or on a Pico those that an interrupt reaches.
+/// There, the crates of the USB device contain panics. They run below the tick, and a panic turns the motor off.
+///
+/// # Errors
+/// [`StackError`] if it is unknown what an interrupt reaches.
+pub fn wrong_functions(image: &LinkedImage) -> Result<Vec<&str>, StackError> {
+    Ok(match image.chip {
+        ImageChip::F4 => forbidden_functions(image),
+        ImageChip::Rp2040 => forbidden_in_handlers(image)?,
+    })
+}
+
+/// Those of [`forbidden_functions`] that interrupts and exceptions reach, among them the tick.
+///
+/// # Errors
+/// As for [`wrong_functions`].
+pub fn forbidden_in_handlers(image: &LinkedImage) -> Result<Vec<&str>, StackError> {
+    let reached = reached_by_handlers(image)?;
+    Ok(reached.into_iter().filter(|name| is_forbidden(name)).collect())
 }
 
 fn is_forbidden(name: &str) -> bool {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source, write_atomically};
 
-use super::build::{images, one_at_a_time};
+use super::build::{PROFILE, images, one_at_a_time};
 use super::compiler::{Compiler, compiler_for_chips};
 use super::error::BuildError;
 use super::pico_limits::check;
@@ -54,11 +54,11 @@ pub fn build_pico(rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildErro
 fn compiled(gains: &Path) -> Result<Vec<u8>, BuildError> {
     let Compiler { program, mut cargo, target_directory, .. } = compiler_for_chips(&[TARGET])?;
     cargo.current_dir(checkout()?.join("boards/rp2040")).env("UPRIGHT_GAINS", gains);
-    cargo.args(["build", "--quiet", "--release", "--locked", "--target", TARGET]);
+    cargo.args(["build", "--quiet", "--profile", PROFILE, "--locked", "--target", TARGET]);
     let output = cargo.output().map_err(|source| BuildError::Start(program, source))?;
     if !output.status.success() {
         return Err(BuildError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
-    let path = target_directory.join(TARGET).join("release/upright-rp2040");
+    let path = target_directory.join(TARGET).join(PROFILE).join("upright-rp2040");
     std::fs::read(&path).map_err(|source| BuildError::File { path, source })
 }

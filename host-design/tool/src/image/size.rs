@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 
 use upright_board::{Lines, LinesError};
 
-use super::elf::{Item, LinkedImage};
+use super::elf::{ImageChip, Item, LinkedImage, LinkedSection};
 
 /// Limit of an image's code (bytes): its flash without constants, among them the motions, and without the gain table.
 pub const CODE_LIMIT: u32 = 48 * 1024;
+/// The same for a Pico, whose code holds a USB device and arithmetic with f32.
+pub const PICO_CODE_LIMIT: u32 = 72 * 1024;
 /// Limit of its static RAM (bytes): its variables, not counting the stack and the gain table.
 pub const RAM_LIMIT: u32 = 8 * 1024;
 
@@ -16,6 +18,8 @@ const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";
 
 /// The section of constants.
 const CONSTANTS: &str = ".rodata";
+/// The section of variables with an initial value.
+const VARIABLES: &str = ".data";
 
 /// Size of an image in bytes.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -26,8 +30,12 @@ pub struct Size {
     pub constants: u32,
     /// Static RAM: all variables, without the stack.
     pub ram: u32,
-    /// The gain table, which takes this much in flash and again in RAM.
+    /// The gain table, which takes this much in flash and again in RAM; 0 if it is among the constants.
     pub table: u32,
+    /// Code and constants that run from RAM, in flash and again in RAM.
+    pub copied: u32,
+    /// Limit of the code.
+    pub code_limit: u32,
     /// By section, in the order of addresses.
     pub sections: Vec<ImagePart>,
     /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
@@ -35,14 +43,14 @@ pub struct Size {
 }
 
 impl Size {
-    /// Flash without the gain table and without constants; the limit is [`CODE_LIMIT`].
+    /// Flash without the gain table and without constants; the limit is [`Size::code_limit`].
     pub fn code(&self) -> u32 {
         self.flash - self.table - self.constants
     }
 
-    /// Static RAM without the gain table; the limit is [`RAM_LIMIT`].
+    /// Static RAM without the gain table, and without what is copied there; the limit is [`RAM_LIMIT`].
     pub fn variables(&self) -> u32 {
-        self.ram - self.table
+        self.ram - self.table - self.copied
     }
 }
 
@@ -77,8 +85,13 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
     let ram: u32 = sections.iter().map(|part| part.ram).sum();
 
     let mut shares: BTreeMap<String, ImagePart> = BTreeMap::new();
+    let is_copied = |section: &LinkedSection| section.in_flash && section.in_ram && section.name != VARIABLES;
+    let copied_section = |name: &str| image.sections.iter().any(|part| part.name == name && is_copied(part));
+    let code_is_copied = copied_section(".text");
     for (name, bytes) in code_by_crate(image)? {
-        shares.entry(name).or_default().flash += bytes;
+        let share = shares.entry(name).or_default();
+        share.flash += bytes;
+        share.ram += if code_is_copied { bytes } else { 0 };
     }
     let mut table = 0;
     for item in &image.data {
@@ -88,8 +101,9 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
             table = item.size;
             share.flash += item.size;
         }
-        let place = if item.address >= 0x1000_0000 { &mut share.ram } else { &mut share.flash };
-        *place += item.size;
+        let Some(section) = image.section_at(item.address) else { continue };
+        share.ram += if section.in_ram { item.size } else { 0 };
+        share.flash += if !section.in_ram || is_copied(section) { item.size } else { 0 };
     }
     let (counted_flash, counted_ram) =
         shares.values().fold((0, 0), |(flash, ram), part| (flash + part.flash, ram + part.ram));
@@ -100,7 +114,13 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
         shares.into_iter().map(|(name, part)| ImagePart { name, ..part }).collect();
     crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
     let constants = sections.iter().filter(|part| part.name == CONSTANTS).map(|part| part.flash).sum();
-    Ok(Size { flash, constants, ram, table, sections, crates })
+    let copied =
+        image.sections.iter().filter(|section| is_copied(section)).map(|section| section.bytes).sum();
+    let code_limit = match image.chip {
+        ImageChip::F4 => CODE_LIMIT,
+        ImageChip::Rp2040 => PICO_CODE_LIMIT,
+    };
+    Ok(Size { flash, constants, ram, table, copied, code_limit, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.
@@ -143,9 +163,9 @@ fn crate_of_file(path: &str) -> String {
 
 /// The crate of a function or variable by its path.
 fn crate_of_symbol(item: &Item) -> String {
-    let path = item.name.trim_start_matches(['<', '&', '(']);
+    let path = item.name.trim_start_matches(['<', '&', '(', '[']);
     match path.split_once("::") {
-        Some(("upright_image", _)) => "upright".to_owned(),
+        Some(("upright_image" | "upright_rp2040", _)) => "upright".to_owned(),
         Some((name, _)) => name.to_owned(),
         None if item.name.starts_with("__INTERRUPTS")
             || item.name.starts_with("__EXCEPTIONS")

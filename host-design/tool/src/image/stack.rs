@@ -7,10 +7,6 @@ use upright_board::{Effect, effect, is_wide};
 
 use super::elf::LinkedImage;
 
-/// Largest frame that the processor stacks at exception entry (bytes; Armv7-M Architecture Reference Manual, B1.5.7):
-/// 8 words, 18 of the floating-point unit, and one for alignment.
-const EXCEPTION_FRAME: u32 = 108;
-
 /// The most stack that an image can need.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct StackBound {
@@ -82,7 +78,7 @@ pub fn stack_bound(image: &LinkedImage) -> Result<StackBound, StackError> {
     let mut levels: Vec<StackLevel> = Vec::new();
     let mut entries: Vec<(usize, u32)> = Vec::new();
     for (number, address) in &image.vectors {
-        let frame = if *number == 1 { 0 } else { EXCEPTION_FRAME };
+        let frame = if *number == 1 { 0 } else { image.chip.exception_frame() };
         let function = index_of(image, "the vector table", *address)?;
         if !entries.contains(&(function, frame)) {
             entries.push((function, frame));
@@ -94,6 +90,26 @@ pub fn stack_bound(image: &LinkedImage) -> Result<StackBound, StackError> {
     }
     let bytes = levels.iter().map(|level| level.bytes).sum();
     Ok(StackBound { bytes, reserved: image.stack_reserved, levels })
+}
+
+/// The functions that interrupts and exceptions reach, which is what can delay or end a tick.
+///
+/// # Errors
+/// As for [`stack_bound`], but functions may call themselves.
+pub(super) fn reached_by_handlers(image: &LinkedImage) -> Result<Vec<&str>, StackError> {
+    let nodes = reachable(image)?;
+    let mut waiting = Vec::new();
+    for (_, address) in image.vectors.iter().filter(|(number, _)| *number != 1) {
+        waiting.push(index_of(image, "the vector table", *address)?);
+    }
+    let mut is_reached = vec![false; nodes.len()];
+    while let Some(index) = waiting.pop() {
+        if !std::mem::replace(&mut is_reached[index], true) {
+            waiting.extend(&nodes[index].calls);
+        }
+    }
+    let reached = image.functions.iter().zip(is_reached).filter(|(_, is_reached)| *is_reached);
+    Ok(reached.map(|(function, _)| function.name.as_str()).collect())
 }
 
 fn index_of(image: &LinkedImage, caller: &str, target: u32) -> Result<usize, StackError> {
@@ -139,10 +155,11 @@ fn node(image: &LinkedImage, index: usize) -> Result<FunctionFrame, StackError> 
     for (place, &(address, effect)) in effects.iter().enumerate() {
         match effect {
             Effect::Grow(bytes) => node.frame += bytes,
-            Effect::Call(target) => node.calls.push(index_of(image, &name, target)?),
-            Effect::Jump(target) => {
+            // On a Cortex-M0, far jumps within a function are calls as well.
+            Effect::Call(target) | Effect::Jump(target) => {
                 let other = index_of(image, &name, target)?;
-                if other != index {
+                let is_call = matches!(effect, Effect::Call(_)) && target == image.functions[index].address;
+                if other != index || is_call {
                     node.calls.push(other);
                 }
             }
@@ -154,6 +171,15 @@ fn node(image: &LinkedImage, index: usize) -> Result<FunctionFrame, StackError> 
             Effect::FromRegister(register) => {
                 let growth = growth(image, &effects, place, register);
                 node.frame += growth.ok_or(StackError::Variable { function: name.clone(), address })?;
+            }
+            Effect::Moved(register) => {
+                let growth = growth_by(image, &effects, place, register);
+                node.frame += growth.ok_or(StackError::Variable { function: name.clone(), address })?;
+            }
+            // What the linker puts between code that is far apart.
+            Effect::Literal(_, at) if name.contains("LongThunk_") => {
+                let target = image.word_in_code(at).unwrap_or_default() & !1;
+                node.calls.push(index_of(image, &name, target)?);
             }
             Effect::Unknown => return Err(StackError::Variable { function: name, address }),
             Effect::Aligned(..)
@@ -177,11 +203,9 @@ fn before(effects: &[(u32, Effect)], place: usize) -> Vec<Effect> {
 /// Whether a register holds the address of a table near the code, or of an entry in it, after these instructions.
 fn is_in_a_table(before: &[Effect], register: u8) -> bool {
     let is_near = |register| before.contains(&Effect::Near(register));
-    let indexed = before.iter().find_map(|effect| match effect {
-        Effect::Indexed(to, from) if *to == register => Some(*from),
-        _ => None,
-    });
-    is_near(register) || indexed.is_some_and(is_near)
+    let is_entry =
+        |effect: &Effect| matches!(effect, Effect::Indexed(to, from) if *to == register && is_near(*from));
+    is_near(register) || before.iter().any(is_entry)
 }
 
 /// Largest growth of the stack when its pointer becomes this register's value; `None` if unknown.
@@ -198,6 +222,16 @@ fn growth(image: &LinkedImage, effects: &[(u32, Effect)], place: usize, register
             if loaded == register && image.word_in_code(at) == Some(image.stack_start) =>
         {
             Some(0)
+        }
+        _ => None,
+    })
+}
+
+/// Growth of the stack when its pointer moves by this register's value, a constant; `None` if it is not.
+fn growth_by(image: &LinkedImage, effects: &[(u32, Effect)], place: usize, register: u8) -> Option<u32> {
+    before(effects, place).into_iter().rev().find_map(|effect| match effect {
+        Effect::Literal(loaded, at) if loaded == register => {
+            image.word_in_code(at).map(|word| (word as i32).min(0).unsigned_abs())
         }
         _ => None,
     })

@@ -69,6 +69,20 @@ fn the_image_for_the_board_ends_a_wait_for_the_clock_with_its_fault() {
 }
 
 #[test]
+fn the_first_tick_comes_within_a_tenth_of_a_second_even_without_a_crystal() {
+    let Some(image) = image() else { return };
+    let first_tick_s = |crystal_hz: u32| {
+        let mut run = Powered::strict(&image, &with_crystal(crystal_hz, 16_000_000));
+        (1..500).map(|step| 1e-3 * f64::from(step)).find(|&time_s| {
+            run.run(time_s);
+            run.board.next_tick().is_some()
+        })
+    };
+    let [with, without] = [8_000_000, 0].map(|hz| first_tick_s(hz).unwrap());
+    assert!(with < 0.01 && without < 0.1, "{with} s, {without} s without a crystal");
+}
+
+#[test]
 fn another_crystal_is_noticed_and_reported_at_the_right_baud_rate() {
     let Some(image) = image() else { return };
     let fault = (State::Fault, Some(Fault::Clock));

@@ -9,7 +9,9 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use upright_tool::image::{ImageKind, LinkedImage, StackError, forbidden_functions, size, stack_bound};
+use upright_tool::image::{
+    ImageKind, LinkedImage, StackError, forbidden_functions, forbidden_in_handlers, size, stack_bound,
+};
 
 use crate::equipment::built;
 
@@ -52,6 +54,15 @@ fn a_panic_is_found() {
     let Some(path) = path_in_the_loop() else { return };
     let image = LinkedImage::read(path).unwrap();
     let found = forbidden_functions(&image);
+    assert!(found.contains(&"core::panicking::panic_fmt"), "{found:?}");
+}
+
+/// On a Pico, only what interrupts reach has to be free of panics. Its images, which CI measures, have none there.
+#[test]
+fn a_panic_in_an_interrupt_is_found() {
+    let Some(path) = path_in_the_loop() else { return };
+    let image = LinkedImage::read(path).unwrap();
+    let found = forbidden_in_handlers(&image).unwrap();
     assert!(found.contains(&"core::panicking::panic_fmt"), "{found:?}");
 }
 

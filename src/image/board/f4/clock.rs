@@ -35,8 +35,8 @@ const _: () = assert!(
     "the board's crystal_hz: the PLL cannot make the core clock from it"
 );
 
-/// Iterations of a waiting loop: at 16 MHz and at least 4 cycles each, 50 ms or more. A crystal starts within 10 ms.
-const PATIENCE: u32 = 200_000;
+/// Iterations of a waiting loop: at 16 MHz and 4 to 24 cycles each, 12 to 75 ms. A crystal starts within 10 ms.
+const PATIENCE: u32 = 50_000;
 
 /// Bits of RCC_CR that code may write; the others belong to the hardware or are reserved (RM0090, 7.3.1).
 const CONTROL_BITS: u32 = 0x050d_00f9;
