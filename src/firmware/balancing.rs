@@ -3,7 +3,7 @@
 use super::Firmware;
 use crate::board::{Inputs, Output};
 use crate::control::controller::MotorCommand;
-use crate::supervision::detection::Finding;
+use crate::supervision::finding::Finding;
 use crate::supervision::envelope;
 use crate::supervision::fault::Fault;
 use crate::table::SwingUp;

@@ -79,7 +79,8 @@ fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does()
         assert_eq!(firmware.jog.update(sign_counts, sign_counts, TICK_S), None);
         assert_eq!(firmware.motor_sign(), MotorSign::Checked);
         firmware.trip(entry.fault, None);
-        let doubted = [Fault::Encoder, Fault::Frozen, Fault::Motor, Fault::Watchdog, Fault::Crash];
+        let doubted =
+            [Fault::Encoder, Fault::Frozen, Fault::Motor, Fault::Disturbed, Fault::Watchdog, Fault::Crash];
         assert_eq!(firmware.motor_sign() == MotorSign::Unchecked, doubted.contains(&entry.fault));
     }
 }
@@ -129,30 +130,37 @@ fn a_rail_of_another_length_is_not_homed() {
 }
 
 /// Ticks of balancing in [`cause_of`], at the end of a pass of the table's checksum.
-const TICKS: u32 = 3;
+const TICKS: u32 = 12;
+/// What takes three ticks in a row begins here.
+const LAST_THREE: u32 = TICKS - 2;
 
-/// Two tables. The limits of the first one catch only a bad encoder, because it takes three measurements in a row.
-/// Those of the second one catch each of `faults` that is found with a table.
+/// Two tables. The limits of the first one catch only a jump of the first link's encoder and a push of the second link,
+/// because they take three measurements in a row. Those of the second one catch each of `faults` that is found with a
+/// table.
 fn calm_and_strict(faults: &[Fault]) -> [GainTable<STATES, SENSORS>; 2] {
     let due = |fault| faults.contains(&fault);
     let mut calm = TABLE;
     calm.limits.angle_rad = f32::MAX;
     calm.thresholds.innovation = [f32::MAX; SENSORS];
-    calm.thresholds.frozen = [f32::MAX; SENSORS];
+    calm.thresholds.push = [1e30; SENSORS];
     calm.thresholds.motor.energy = f32::MAX;
     if due(Fault::Encoder) {
-        calm.thresholds.innovation[1] = -1.0;
+        calm.thresholds.innovation[1] = 0.1;
+    }
+    if due(Fault::Disturbed) {
+        (calm.thresholds.innovation[2], calm.thresholds.push[2]) = (0.002, 0.002);
     }
     let mut strict = calm;
     let (limits, thresholds) = (&mut strict.limits, &mut strict.thresholds);
-    (limits.supply_ticks, limits.link_ticks, limits.saturated_ticks) = (TICKS - 1, TICKS, 0);
+    (limits.supply_ticks, limits.link_ticks, limits.saturated_ticks) = (2, TICKS, 0);
     limits.rail_m = if due(Fault::Rail) { [5.0, 6.0] } else { limits.rail_m };
     limits.angle_rad = if due(Fault::Angle) { -1.0 } else { limits.angle_rad };
     limits.speed_m_per_s = if due(Fault::Speed) { -1.0 } else { limits.speed_m_per_s };
-    thresholds.frozen = if due(Fault::Frozen) { [-1.0; SENSORS] } else { thresholds.frozen };
+    if due(Fault::Frozen) {
+        thresholds.innovation[3] = -1.0;
+    }
     if due(Fault::Motor) {
-        (thresholds.motor.ratio, thresholds.motor.energy) = (-1.0, -1.0);
-        calm.thresholds.motor.b = [1.0; 2];
+        (thresholds.motor.ratio, thresholds.motor.energy) = (f32::MIN, 0.0);
     }
     strict.crc ^= u32::from(due(Fault::Table));
     [calm, strict]
@@ -175,15 +183,27 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     firmware.start_balancing(&[0; SENSORS]);
     // To make the controller request a force that the motor test can find missing.
     firmware.controller.set_setpoint(0.5).unwrap();
-    firmware.table = &calm;
+    // The missing force of a single tick explains the jump of the cart in the last one.
+    let mut unmoved = calm;
+    unmoved.thresholds.motor.b = [0.0; 2];
     let mut inputs = INPUTS;
-    inputs.contacts.overrun = due(Fault::Overrun);
-    inputs.supply_v = if due(Fault::Supply) { -1.0 } else { inputs.supply_v };
-    for _ in 1..TICKS {
+    let show = |inputs: &mut Inputs<SENSORS>, tick: u32| {
+        inputs.contacts.overrun = due(Fault::Overrun) && tick >= LAST_THREE;
+        inputs.supply_v = if due(Fault::Supply) && tick >= LAST_THREE { -1.0 } else { INPUTS.supply_v };
+        let [cart, first, second, ..] = &mut inputs.raw_counts;
+        *cart = if due(Fault::Motor) && tick == TICKS { 20 } else { 0 };
+        *first = if due(Fault::Encoder) && tick >= LAST_THREE { 500 } else { 0 };
+        // About 1.5 mrad per tick, which is no jump.
+        *second = if due(Fault::Disturbed) { (tick + 2).saturating_sub(LAST_THREE) } else { 0 };
+    };
+    for tick in 1..TICKS {
+        show(&mut inputs, tick);
+        firmware.table = if tick < TICKS - 1 { &unmoved } else { &calm };
         firmware.control(&inputs);
         firmware.finish(None, 0);
         assert_eq!(firmware.state(), State::Balancing, "{:?}", firmware.cause());
     }
+    show(&mut inputs, TICKS);
     inputs.contacts.clock_fault = due(Fault::Clock);
     inputs.contacts.board_fault = due(Fault::Board);
     inputs.contacts.emergency_stop = due(Fault::EmergencyStop);
@@ -192,7 +212,7 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     inputs.supply_v = if due(Fault::NotFinite) { f32::NAN } else { inputs.supply_v };
     firmware.setpoint_commanded = due(Fault::LinkLost);
     if due(Fault::Saturated) {
-        let mut leaning = nalgebra::SVector::zeros();
+        let mut leaning = *firmware.controller.estimate();
         leaning[2] = 0.3;
         firmware.controller.start_in_state(&leaning);
     }

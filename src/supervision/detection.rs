@@ -11,39 +11,76 @@
 //! - *Motor*: the innovation of the cart is compared with the one that a missing force `-u` would cause. Their ratio,
 //!   by least squares with the same memory, is 0 for a healthy motor, 1 for a dead one and 2 for a reversed one. For a
 //!   drive with pulses, whose count shows nothing, it is the innovation of the first link and a missing acceleration.
+//!
+//! While a rig balances with a force, a hand may push it. Then [`pushes`](crate::supervision::pushes) tests the
+//! encoders instead, and the missing force also has to explain nearly all of the innovation, which a hand's force does
+//! not: for a dead motor with a memory of [`LONG_MEMORY`] ticks, and with the short one for a motor that is stuck, of
+//! which about twice the force is missing.
 
 use crate::supervision::fault::Fault;
+use crate::supervision::finding::{Finding, IN_A_ROW};
+use crate::supervision::pushes::{PushFindings, Pushes};
 use crate::table::{MotorTest, Thresholds};
 
 /// Memory of the sums (ticks): each tick keeps `1 - 1/MEMORY` of them.
 pub const MEMORY: f32 = 16.0;
 const KEEP: f32 = 1.0 - 1.0 / MEMORY;
-/// This many implausible measurements in a row are a fault.
-pub const IN_A_ROW: u32 = 3;
-
-/// What the tests of a tick have found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Finding {
-    /// [`Fault::Encoder`], [`Fault::Frozen`] or [`Fault::Motor`].
-    pub fault: Fault,
-    /// The sensor (0: cart, 1: first link …).
-    pub sensor: u8,
-}
+/// Memory of the motor's test while a hand may push (ticks).
+pub const LONG_MEMORY: f32 = 256.0;
+const KEEP_LONG: f32 = 1.0 - 1.0 / LONG_MEMORY;
+/// Least share of the innovation (of its sum of squares) that a missing force then has to explain …
+const EXPLAINED: f32 = 0.97;
+/// … and that of a motor that is stuck, in the shorter memory.
+const STUCK_EXPLAINED: f32 = 0.95;
+/// The missing share of a motor that is stuck lies between these.
+const STUCK: [f32; 2] = [1.5, 3.0];
 
 /// State of the tests.
 #[derive(Debug, Clone)]
 pub struct Detection<const NY: usize> {
     sensors: [SensorMemory; NY],
+    pushes: Pushes<NY>,
     /// The sensor of the motor's test: 0, the cart, or 1, the first link.
     motor_sensor: u8,
     /// Error `(p, v)` of predicted position and speed of that sensor (m, m/s) that a missing force would have caused by
     /// now.
     missing: [f32; 2],
+    sums: MotorSums,
+    /// The same with a longer memory, while a hand may push.
+    long: MotorSums,
+    rejected: u32,
+}
+
+/// Sums of the motor's test, which forget: `p` is the innovation that a missing force would have caused.
+#[derive(Debug, Clone, Copy, Default)]
+struct MotorSums {
     /// Sum of `e p` (m²).
     correlation: f32,
     /// Sum of `p²` (m²).
     energy: f32,
-    rejected: u32,
+    /// Sum of `e²` (m²).
+    error: f32,
+}
+
+impl MotorSums {
+    #[inline(always)]
+    fn add(&mut self, keep: f32, e: f32, p: f32) {
+        self.correlation = keep * self.correlation + e * p;
+        self.energy = keep * self.energy + p * p;
+        self.error = keep * self.error + e * e;
+    }
+
+    /// Whether there is enough energy for a verdict, and more than the share `ratio` of the force is missing.
+    #[inline(always)]
+    fn lacks(&self, ratio: f32, energy: f32) -> bool {
+        self.energy > energy && self.correlation > ratio * self.energy
+    }
+
+    /// Whether a missing force explains at least this share of the innovation.
+    #[inline(always)]
+    fn is_explained(&self, share: f32) -> bool {
+        self.correlation * self.correlation > share * (self.energy * self.error)
+    }
 }
 
 /// State of the tests of one sensor.
@@ -62,10 +99,11 @@ impl<const NY: usize> Default for Detection<NY> {
     fn default() -> Self {
         Self {
             sensors: [SensorMemory::default(); NY],
+            pushes: Pushes::default(),
             motor_sensor: 0,
             missing: [0.0; 2],
-            correlation: 0.0,
-            energy: 0.0,
+            sums: MotorSums::default(),
+            long: MotorSums::default(),
             rejected: 0,
         }
     }
@@ -81,7 +119,8 @@ impl<const NY: usize> Detection<NY> {
 
     /// Restarts the tests at positions `y` (m or rad); the number of rejected measurements stays.
     pub fn start(&mut self, counts: &[i32; NY], y: &[f32; NY]) {
-        *self = Self { rejected: self.rejected, motor_sensor: self.motor_sensor, ..Self::default() };
+        let pushes = Pushes::at(counts);
+        *self = Self { rejected: self.rejected(), motor_sensor: self.motor_sensor, pushes, ..Self::default() };
         for ((sensor, &counts), &corrected) in self.sensors.iter_mut().zip(counts).zip(y) {
             (sensor.counts, sensor.corrected) = (counts, corrected);
         }
@@ -89,9 +128,31 @@ impl<const NY: usize> Detection<NY> {
 
     /// Tests the innovation `e = y - C x̂⁻` of a tick (m or rad); sets that of an implausible measurement to 0.
     ///
-    /// If several tests fail in one tick, the result is the first of: implausible, frozen, motor.
+    /// If several tests fail in one tick, the result is the first of: implausible, frozen, motor, pushed too hard.
     #[inline(always)]
     pub fn test(
+        &mut self,
+        thresholds: &Thresholds<NY>,
+        counts: &[i32; NY],
+        y: &[f32; NY],
+        e: &mut [f32; NY],
+    ) -> Option<Finding> {
+        let survives_pushes = thresholds.survives_pushes();
+        let found = if survives_pushes {
+            self.pushes.test(thresholds, counts, e)
+        } else {
+            PushFindings { encoder: self.test_sensors(thresholds, counts, y, e), push: None }
+        };
+        // The innovation of a rejected measurement is 0: it says nothing about the motor.
+        // With constant indices, the processor has no bound to check.
+        let e_motor = if self.motor_sensor == 0 { e.first() } else { e.get(1) };
+        let motor = self.test_motor(&thresholds.motor, e_motor.copied().unwrap_or_default(), survives_pushes);
+        found.encoder.or(motor).or(found.push)
+    }
+
+    /// Tests the size of each innovation, and the motion of each counter that stands still.
+    #[inline(always)]
+    fn test_sensors(
         &mut self,
         thresholds: &Thresholds<NY>,
         counts: &[i32; NY],
@@ -123,11 +184,7 @@ impl<const NY: usize> Detection<NY> {
         } else {
             self.reject(thresholds, e)
         };
-        // The innovation of a rejected measurement is 0: it says nothing about the motor.
-        // With constant indices, the processor has no bound to check.
-        let e_motor = if self.motor_sensor == 0 { e.first() } else { e.get(1) };
-        let motor = self.test_motor(&thresholds.motor, e_motor.copied().unwrap_or_default());
-        implausible.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor })).or(motor)
+        implausible.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor }))
     }
 
     /// Sets implausible innovations to 0, and counts them.
@@ -153,11 +210,19 @@ impl<const NY: usize> Detection<NY> {
     }
 
     #[inline]
-    fn test_motor(&mut self, test: &MotorTest, e: f32) -> Option<Finding> {
+    fn test_motor(&mut self, test: &MotorTest, e: f32, survives_pushes: bool) -> Option<Finding> {
         let [missing, _] = self.missing;
-        self.correlation = KEEP * self.correlation + e * missing;
-        self.energy = KEEP * self.energy + missing * missing;
-        let found = self.energy > test.energy && self.correlation > test.ratio * self.energy;
+        self.sums.add(KEEP, e, missing);
+        let found = if survives_pushes {
+            self.long.add(KEEP_LONG, e, missing);
+            let [least, most] = STUCK;
+            // A steady error of the model adds up with the square root of the memory.
+            let dead = self.long.lacks(test.ratio, LONG_MEMORY / MEMORY * test.energy);
+            let stuck = self.sums.lacks(least, test.energy) && !self.sums.lacks(most, test.energy);
+            (dead && self.long.is_explained(EXPLAINED)) || (stuck && self.sums.is_explained(STUCK_EXPLAINED))
+        } else {
+            self.sums.lacks(test.ratio, test.energy)
+        };
         found.then_some(Finding { fault: Fault::Motor, sensor: self.motor_sensor })
     }
 
@@ -180,12 +245,13 @@ impl<const NY: usize> Detection<NY> {
 
     /// Number of measurements rejected since power-up or the last [`reset_rejected`](Self::reset_rejected).
     pub fn rejected(&self) -> u32 {
-        self.rejected
+        self.rejected.saturating_add(self.pushes.rejected())
     }
 
     /// Sets the number of rejected measurements to 0.
     pub fn reset_rejected(&mut self) {
         self.rejected = 0;
+        self.pushes.reset_rejected();
     }
 }
 
@@ -196,6 +262,7 @@ mod tests {
     const THRESHOLDS: Thresholds<2> = Thresholds {
         innovation: [1.0, 1.0],
         frozen: [3.0, 3.0],
+        push: [f32::MAX; 2],
         // A filter that follows the measurement at once, and 1 m per newton and tick.
         motor: MotorTest { a: [0.0; 4], b: [1.0, 0.0], ratio: 0.5, energy: 4.0 },
     };
@@ -295,5 +362,41 @@ mod tests {
         assert_eq!(found(0.55), Some(Fault::Motor));
         assert_eq!(found(1.0), Some(Fault::Motor));
         assert_eq!(found(-1.0), None, "more force than asked for is not a missing one");
+    }
+    /// The finding and its tick where a hand may push, for a motor that lacks the share `missing` of a force of this
+    /// size, and with another force `by_hand` on the cart.
+    fn pushed(missing: f32, force_n: f32, by_hand: f32) -> Option<(i32, Finding)> {
+        let thresholds = Thresholds { innovation: [9.0; 2], push: [90.0; 2], ..THRESHOLDS };
+        let mut detection = Detection::<2>::default();
+        detection.start(&[0; 2], &[0.0; 2]);
+        let mut force = 0.0;
+        (1..1000).find_map(|tick| {
+            let mut e = [-missing * force + by_hand, 0.0];
+            let found = detection.test(&thresholds, &[2 * tick; 2], &[tick as f32; 2], &mut e);
+            force = if tick % 4 < 2 { force_n } else { -force_n };
+            detection.finish_tick(&thresholds.motor, [tick as f32; 2], force);
+            found.map(|finding| (tick, finding))
+        })
+    }
+
+    #[test]
+    fn where_a_hand_may_push_a_missing_force_has_to_explain_the_innovation() {
+        let motor = Some(Finding { fault: Fault::Motor, sensor: 0 });
+        assert_eq!(pushed(0.0, 0.6, 0.0), None);
+        assert_eq!(pushed(0.45, 0.6, 0.0), None);
+        assert_eq!(pushed(0.55, 0.6, 0.0).map(|(_, found)| found), motor);
+        assert_eq!(pushed(1.0, 0.6, 0.0).map(|(_, found)| found), motor);
+        assert_eq!(pushed(1.0, 0.6, 0.4), None, "a hand explains a part of it");
+        assert_eq!(pushed(-1.0, 0.6, 0.0), None, "more force than asked for is not a missing one");
+        // 0.25 per tick sums up to 4 after 17 ticks in the long memory, and to 64 never.
+        assert_eq!(pushed(1.0, 0.4, 0.0), None);
+    }
+
+    #[test]
+    fn a_motor_that_is_stuck_is_found_within_the_short_memory() {
+        let within = |missing| pushed(missing, 1.0, 0.0).is_some_and(|(tick, _)| tick < 8);
+        assert!(within(2.0));
+        assert!(!within(1.2), "a dead motor needs the long memory");
+        assert!(!within(3.5), "a hand that pushes harder than the motor");
     }
 }

@@ -50,6 +50,8 @@ pub enum Fault {
     Board = 19,
     /// The cart or a link is too far from the planned motion.
     TrackingError = 20,
+    /// The measurements are further from the model than after any push that the rig survives.
+    Disturbed = 21,
 }
 
 /// Longest time from a fault's first effect on the firmware's inputs to motor off.
@@ -90,7 +92,7 @@ pub struct Entry {
 
 impl Fault {
     /// Every fault, by code.
-    pub const ALL: [Entry; 20] = [
+    pub const ALL: [Entry; 21] = [
         Entry {
             fault: Fault::NotFinite,
             name: "not finite",
@@ -153,8 +155,8 @@ impl Fault {
         Entry {
             fault: Fault::Encoder,
             name: "encoder",
-            condition: "three measurements in a row of one encoder contradict the model: it jumps, is reversed, swapped or \
-                        late; single ones are rejected and counted",
+            condition: "three measurements in a row of one encoder contradict the model: it jumps, or, except while balancing \
+                        with a force, is reversed, swapped or late; single ones are rejected and counted",
             reaction: Reaction::Ticks(3),
             remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too, and on a stepper the \
                      drive in any case; home, and check the signs again",
@@ -162,8 +164,8 @@ impl Fault {
         Entry {
             fault: Fault::Frozen,
             name: "frozen encoder",
-            condition: "an encoder stands still while the model moves it by a seventh of its threshold per tick or more; slower \
-                        motion is found later, long before a limit",
+            condition: "an encoder stands still while the model moves it by a seventh of its threshold per tick or more; while \
+                        balancing with a force, also if its wire is open; slower motion is found later",
             reaction: Reaction::Ticks(10),
             remedy: "check plug, wire and coupling of this encoder, and on a stepper the drive; home, and check the signs \
                      again",
@@ -245,6 +247,14 @@ impl Fault {
             reaction: Reaction::Ticks(1),
             remedy: "let the links hang; check masses and friction in the rig file, and that nothing touches the links",
         },
+        Entry {
+            fault: Fault::Disturbed,
+            name: "disturbed",
+            condition: "three measurements in a row are further from the model than after any push that the rig survives: \
+                        pushed too hard while balancing with a force, or an encoder reversed or swapped, or the motor stuck",
+            reaction: Reaction::Ticks(3),
+            remedy: "let the links hang, then raise them again; if nobody pushed, check encoders and motor",
+        },
     ];
 
     /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits
@@ -254,7 +264,7 @@ impl Fault {
     /// switches, that of the requested force after the overrun. A [`Fault::Motor`] found by rejected measurements of
     /// several sensors has the place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the
     /// microcontroller.
-    pub const PRECEDENCE: [Fault; 18] = [
+    pub const PRECEDENCE: [Fault; 19] = [
         Fault::Clock,
         Fault::Board,
         Fault::EmergencyStop,
@@ -270,6 +280,7 @@ impl Fault {
         Fault::Encoder,
         Fault::Frozen,
         Fault::Motor,
+        Fault::Disturbed,
         Fault::Saturated,
         Fault::LinkLost,
         Fault::Table,
@@ -303,7 +314,7 @@ impl Fault {
     /// Whether the motor's sign has to be checked again after this fault: the motor, or the encoder that it was
     /// checked against, is in doubt.
     pub fn doubts_motor(self) -> bool {
-        self.loses_positions() || self == Fault::Motor
+        self.loses_positions() || matches!(self, Fault::Motor | Fault::Disturbed)
     }
 }
 

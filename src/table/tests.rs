@@ -31,6 +31,7 @@ const LIMITS: Limits<2> = Limits {
 const THRESHOLDS: Thresholds<2> = Thresholds {
     innovation: [0.1, 0.2],
     frozen: [0.3, 0.4],
+    push: [0.5, 0.6],
     motor: MotorTest { a: [1.0, 2.0, 3.0, 4.0], b: [5.0, 6.0], ratio: 0.5, energy: 7.0 },
 };
 

@@ -11,6 +11,9 @@ part! {
         pub innovation: [f32; NY],
         /// Largest predicted motion of each sensor while its counter stands still (m or rad).
         pub frozen: [f32; NY],
+        /// Largest innovation of each sensor under a push that the rig survives (m or rad); [`f32::MAX`] where pushes
+        /// are not told from defects.
+        pub push: [f32; NY],
         /// Model and thresholds of the motor test.
         pub motor: MotorTest,
     }
@@ -43,13 +46,19 @@ impl MotorTest {
 impl<const NY: usize> Thresholds<NY> {
     /// Thresholds that are never exceeded.
     pub const fn none() -> Self {
-        Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], motor: MotorTest::NONE }
+        Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], push: [f32::MAX; NY], motor: MotorTest::NONE }
+    }
+
+    /// Whether pushes by hand are told from defects.
+    #[inline(always)]
+    pub fn survives_pushes(&self) -> bool {
+        self.push.first().is_some_and(|push| *push < f32::MAX)
     }
 
     /// Whether every threshold is positive.
     pub(crate) fn is_sound(&self) -> bool {
-        let thresholds =
-            self.innovation.iter().chain(&self.frozen).chain([&self.motor.ratio, &self.motor.energy]);
+        let of_sensors = self.innovation.iter().chain(&self.frozen).chain(&self.push);
+        let thresholds = of_sensors.chain([&self.motor.ratio, &self.motor.energy]);
         thresholds.into_iter().all(|threshold| *threshold > 0.0)
     }
 }

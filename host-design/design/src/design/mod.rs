@@ -23,6 +23,7 @@ mod kalman;
 mod loops;
 mod place;
 mod placed_observer;
+mod pushed;
 mod riccati;
 mod synthesis;
 mod thresholds;

@@ -2,6 +2,7 @@
 
 use super::Design;
 use super::kalman::rounding_variances;
+use super::pushed::pushed;
 use super::tolerated::Tolerated;
 use crate::rig::{CartInput, Rig};
 
@@ -17,6 +18,9 @@ pub struct DetectionDesign {
     pub innovation: Vec<f64>,
     /// Largest predicted motion of each sensor while its counter stands still (m or rad).
     pub frozen: Vec<f64>,
+    /// Largest innovation of each sensor under a push that the rig survives (m or rad); empty where pushes are not told
+    /// from defects.
+    pub push: Vec<f64>,
     /// The motor's test; none for a model, whose sensors need not show the speed that a force causes.
     pub motor: Option<MotorDesign>,
 }
@@ -49,6 +53,7 @@ pub struct MotorDesign {
 ///   `ρ̂ = Σ e p / Σ p²`, where p is the innovation caused by a completely missing force. With a healthy motor its
 ///   standard deviation is `√(S_00 / Σ p²)`; there is no verdict until that is at most 1/g of the share that may be
 ///   missing.
+/// - Push: the first of them, and what the hardest push that a law survives adds to it (see `pushed`).
 ///
 /// For a chain, each is wider by the largest error `B` that the tolerated friction and wrong zeros can cause, the
 /// first also by a factor for wrong masses (see the source of `tolerated`). In the motor's test,
@@ -63,9 +68,11 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     let keep = f64::from(1.0 - 1.0 / upright::supervision::detection::MEMORY);
     let tolerated = Tolerated::of(rig, design, kalman, keep)?;
     let wider = tolerated.lighter;
-    let innovation = (variances.iter().zip(steps).zip(&tolerated.innovation))
+    let innovation: Vec<f64> = (variances.iter().zip(steps).zip(&tolerated.innovation))
         .map(|((s, step), bound)| tolerated.mismatch * wider * (g * s.sqrt() + bound) + 0.5 * step)
         .collect();
+    let by_hand = pushed(rig, design, kalman).unwrap_or_default();
+    let push = by_hand.iter().zip(&innovation).map(|(by_hand, healthy)| healthy + by_hand).collect();
     let rounding = rounding_variances(rig, steps);
     // What a drive with pulses does to the cart is known only from its own count; the first link shows it.
     let sensor = usize::from(rig.actuator.input() == CartInput::Acceleration);
@@ -94,7 +101,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
                 * (wider * (1.0 + wrong / (g * variance.sqrt()))).powi(2),
         }
     });
-    Some(DetectionDesign { deviations: g, innovation, frozen, motor })
+    Some(DetectionDesign { deviations: g, innovation, frozen, push, motor })
 }
 
 /// Number of standard deviations that a Gaussian exceeds, on either side, with this probability.

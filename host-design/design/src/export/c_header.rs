@@ -14,10 +14,12 @@ const HEAD: &str = include_str!("head.txt");
 const STEPS: &str = include_str!("steps.txt");
 const COMPILER: &str = include_str!("compiler.h");
 const PARTS: &str = include_str!("parts.h");
+const TESTS_OF_PUSHES: &str = include_str!("tests_of_pushes.h");
+const TESTS_OF_SIZES: &str = include_str!("tests_of_sizes.h");
 const CALLS: &str = include_str!("calls.h");
 
 /// The faults that the controller in C knows, with their names there; the codes are those of the firmware.
-const FAULTS: [(&str, Fault); 9] = [
+const FAULTS: [(&str, Fault); 10] = [
     ("NOT_FINITE", Fault::NotFinite),
     ("ANGLE", Fault::Angle),
     ("RAIL", Fault::Rail),
@@ -25,6 +27,7 @@ const FAULTS: [(&str, Fault); 9] = [
     ("ENCODER", Fault::Encoder),
     ("FROZEN", Fault::Frozen),
     ("MOTOR", Fault::Motor),
+    ("DISTURBED", Fault::Disturbed),
     ("SATURATED", Fault::Saturated),
     ("TABLE", Fault::Table),
 ];
@@ -59,6 +62,7 @@ pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
         initializer(table, observer)
     );
     out.push_str(PARTS);
+    out.push_str(if table.thresholds.survives_pushes() { TESTS_OF_PUSHES } else { TESTS_OF_SIZES });
     out.push_str(CALLS);
     out += "\n#endif\n";
     Ok(out)
@@ -98,6 +102,7 @@ fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Re
         "MOTOR_SENSOR",
         format!("{} /* whose innovation shows what the motor does */", table.motor_sensor()),
     )?;
+    define("HAS_PUSHES", u8::from(table.thresholds.survives_pushes()).to_string())?;
     define("HAS_FRICTION", u8::from(table.friction.is_some()).to_string())?;
     define("PATTERN", format!("{pattern} /* of Ad: see upright_predict_state */"))?;
     writeln!(
@@ -195,6 +200,7 @@ fn supervision(out: &mut Initializer, table: &TableValues) {
     out.float("arm_angle_rad", limits.arm_angle_rad);
     out.floats("innovation", thresholds.innovation[..sensors].iter().copied());
     out.floats("frozen", thresholds.frozen[..sensors].iter().copied());
+    out.floats("push", thresholds.push[..sensors].iter().copied());
     out.floats("motor_a", thresholds.motor.a);
     out.floats("motor_b", thresholds.motor.b);
     out.float("motor_ratio", thresholds.motor.ratio);

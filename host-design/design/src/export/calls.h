@@ -170,9 +170,11 @@ UPRIGHT_CALL void upright_predict(upright_controller *c)
         }
         c->pending_n = c->applied_n;
     }
+#if !UPRIGHT_HAS_PUSHES
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
         c->sensors[i].corrected = c->estimate[upright_table.measured[i]];
     }
+#endif
     const float *a = upright_table.motor_a, *b = upright_table.motor_b;
     float p = c->missing[0], v = c->missing[1];
     c->missing[0] = a[0] * p + a[1] * v - b[0] * acting;

@@ -79,6 +79,7 @@ typedef struct {
     /* Thresholds of the tests of the innovation. */
     float innovation[UPRIGHT_SENSORS];
     float frozen[UPRIGHT_SENSORS];
+    float push[UPRIGHT_SENSORS];
     float motor_a[4], motor_b[2], motor_ratio, motor_energy;
     uint32_t saturated_ticks, arm_ticks;
     uint32_t measured[UPRIGHT_SENSORS]; /* the state that each sensor measures */

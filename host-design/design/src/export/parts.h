@@ -16,11 +16,26 @@ typedef enum {
 
 /* Memory of the tests of one sensor. */
 typedef struct {
+#if UPRIGHT_HAS_PUSHES
+    int32_t lowest, highest; /* the two neighbouring values at which the counter has stayed */
+    uint32_t still_ticks;    /* for this many ticks */
+    float closest;           /* innovation closest to 0 since then; 0 once its sign has changed (m or rad) */
+    float accepted;          /* last innovation that was accepted (m or rad) */
+    float jump;              /* jump of the first measurement that is rejected now (m or rad) */
+    uint32_t rejected;       /* rejected measurements in a row */
+    uint32_t pushed;         /* ticks in a row beyond the limit for pushes */
+#else
     int32_t counts;
     float corrected;      /* corrected estimate of its position in the tick before (m or rad) */
     float moved;          /* motion that the model predicts while the counter stands still (m or rad) */
     uint32_t implausible; /* implausible measurements in a row */
+#endif
 } upright_sensor_memory;
+
+/* Sums of the motor's test: e p, p^2 and e^2, where p is the innovation that a missing force would have caused. */
+typedef struct {
+    float correlation, energy, error;
+} upright_motor_sums;
 
 /* Read what you like; change it only through the functions. */
 typedef struct {
@@ -47,7 +62,11 @@ typedef struct {
     int32_t emitted; /* pulses so far, from position 0 */
 #endif
     upright_sensor_memory sensors[UPRIGHT_SENSORS];
-    float missing[2], correlation, energy;
+    float missing[2];
+    upright_motor_sums sums; /* over 16 ticks */
+#if UPRIGHT_HAS_PUSHES
+    upright_motor_sums long_sums; /* over 256 ticks */
+#endif
 } upright_controller;
 
 /* ---- Parts of a tick ---- */
@@ -189,10 +208,18 @@ static inline void upright_start(upright_controller *c)
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
         float y = upright_table.step[i] * (float)c->counts[i];
         c->estimate[upright_table.measured[i]] = y;
+#if UPRIGHT_HAS_PUSHES
+        c->sensors[i].lowest = c->sensors[i].highest = c->counts[i];
+#else
         c->sensors[i].counts = c->counts[i];
         c->sensors[i].corrected = y;
+#endif
     }
-    c->missing[0] = c->missing[1] = c->correlation = c->energy = 0.0f;
+    c->missing[0] = c->missing[1] = 0.0f;
+    memset(&c->sums, 0, sizeof c->sums);
+#if UPRIGHT_HAS_PUSHES
+    memset(&c->long_sums, 0, sizeof c->long_sums);
+#endif
     c->integral = c->pending_n = c->last_volts = 0.0f;
     c->saturated = 0;
     c->setpoint_m = c->estimate[UPRIGHT_OUTPUT];
@@ -222,82 +249,26 @@ static inline void upright_wait(upright_controller *c)
     }
 }
 
+/* Adds a tick to the motor's sums, of which each keeps the share `keep`. */
+static inline void upright_add(upright_motor_sums *sums, float keep, float e, float p)
+{
+    sums->correlation = keep * sums->correlation + e * p;
+    sums->energy = keep * sums->energy + p * p;
+    sums->error = keep * sums->error + e * e;
+}
+
+/* Whether more than the share `ratio` of the force is missing. */
+static inline bool upright_lacks(const upright_motor_sums *sums, float ratio, float energy)
+{
+    return sums->energy > energy && sums->correlation > ratio * sums->energy;
+}
+
 /* Moves the governed set-point towards the requested one, no faster than the limits allow. */
 static inline void upright_govern(upright_controller *c, float step)
 {
     float rising = c->target_m - c->setpoint_m;
     rising = rising > step ? step : rising;
     c->setpoint_m += rising < -step ? -step : rising;
-}
-
-/* Sets the innovation of an implausible measurement to 0, so that the prediction replaces it. Three in a row are a
-   fault: of the encoder, or of the motor if several measurements are implausible at once. */
-static inline upright_fault upright_reject(upright_controller *c, uint8_t *sensor)
-{
-    uint8_t rejected_now = 0;
-    bool is_fault = false;
-    for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
-        upright_sensor_memory *memory = &c->sensors[i];
-        if (upright_magnitude(c->innovation[i]) <= upright_table.innovation[i]) {
-            memory->implausible = 0;
-            continue;
-        }
-        c->innovation[i] = 0.0f;
-        upright_count(&memory->implausible, true);
-        upright_count(&c->rejected, true);
-        rejected_now++;
-        if (memory->implausible >= 3 && !is_fault) {
-            is_fault = true;
-            *sensor = i;
-        }
-    }
-    return !is_fault ? UPRIGHT_NO_FAULT : rejected_now > 1 ? UPRIGHT_MOTOR : UPRIGHT_ENCODER;
-}
-
-/* Tests the innovation: do encoders and motor behave as the model says? */
-static inline upright_fault upright_test(upright_controller *c, const float *y, uint8_t *sensor)
-{
-    const float keep = 0.9375f; /* a memory of 16 ticks */
-    bool is_plausible = true, is_frozen = false;
-    uint8_t frozen = 0;
-    for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
-        upright_sensor_memory *memory = &c->sensors[i];
-        float e = c->innovation[i];
-        if (c->counts[i] == memory->counts) {
-            /* y - e is the predicted position. */
-            memory->moved = keep * memory->moved + (y[i] - e - memory->corrected);
-            if (upright_magnitude(memory->moved) > upright_table.frozen[i]) {
-                is_frozen = true;
-                frozen = i;
-            }
-        } else {
-            memory->moved = 0.0f;
-            memory->counts = c->counts[i];
-        }
-        is_plausible = is_plausible && upright_magnitude(e) <= upright_table.innovation[i];
-    }
-    upright_fault found = UPRIGHT_NO_FAULT;
-    if (is_plausible) {
-        for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
-            c->sensors[i].implausible = 0;
-        }
-    } else {
-        found = upright_reject(c, sensor);
-    }
-    float missing = c->missing[0];
-    c->correlation = keep * c->correlation + c->innovation[UPRIGHT_MOTOR_SENSOR] * missing;
-    c->energy = keep * c->energy + missing * missing;
-    if (found != UPRIGHT_NO_FAULT) {
-        return found;
-    }
-    if (is_frozen) {
-        *sensor = frozen;
-        return UPRIGHT_FROZEN;
-    }
-    *sensor = UPRIGHT_MOTOR_SENSOR;
-    bool lacks_force =
-        c->energy > upright_table.motor_energy && c->correlation > upright_table.motor_ratio * c->energy;
-    return lacks_force ? UPRIGHT_MOTOR : UPRIGHT_NO_FAULT;
 }
 
 /* x = x- + L e, and the state feedback N r - K x: positions and rates are summed separately. */

@@ -50,6 +50,8 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
     };
     swing_up.thresholds = balancing;
     let thresholds = &mut swing_up.thresholds;
+    // Nobody pushes a rig that moves as planned.
+    thresholds.push.fill(f32::MAX);
     let of_cart = thresholds.innovation[0];
     for (sensor, (innovation, moved)) in reached.innovation.iter().zip(&reached.moved).enumerate() {
         // The innovation from the rig's noise at rest adds to that from a wrong model in motion.

@@ -82,6 +82,7 @@ pub(super) fn thresholds(design: Option<&DetectionDesign>) -> Thresholds<MAX_SEN
     };
     narrow(&mut thresholds.innovation, &design.innovation);
     narrow(&mut thresholds.frozen, &design.frozen);
+    narrow(&mut thresholds.push, &design.push);
     if let Some(motor) = design.motor {
         thresholds.motor = MotorTest {
             a: motor.a.map(|a| a as f32),
