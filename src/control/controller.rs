@@ -380,17 +380,17 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// Second half of a tick: `x̂⁻ = Ad x̂ + Bd u` with the force actually applied and known friction; also updates
     /// the integral.
     pub fn predict(&mut self) {
-        self.predict_with(|_, _| ());
+        self.predict_with(|_, _, _| ());
     }
 
     /// The same as [`predict`](Self::predict), but a controller that runs from encoders first calls `finish` with the
-    /// current estimates of the measured positions (m or rad) and the force during this tick (N).
+    /// counts, the current estimates of the measured positions (m or rad) and the force during this tick (N).
     #[inline(always)]
-    pub fn predict_with(&mut self, finish: impl FnOnce([T; NY], T)) {
+    pub fn predict_with(&mut self, finish: impl FnOnce(&[i32; NY], &dyn Fn() -> [T; NY], T)) {
         let during_this_tick = if self.active.is_plain { self.applied } else { self.advance() };
         if let Mode::Running(observer) = &self.mode {
             let estimate = &mut self.estimate.data.0[0];
-            finish(observer.measured(estimate), during_this_tick);
+            finish(self.encoders.counts(), &|| observer.measured(estimate), during_this_tick);
             observer.predict(estimate, during_this_tick);
             if !self.active.is_plain
                 && let Some(map) = &self.table.friction

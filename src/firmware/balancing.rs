@@ -3,9 +3,9 @@
 use super::Firmware;
 use crate::board::{Inputs, Output};
 use crate::control::controller::MotorCommand;
-use crate::supervision::finding::Finding;
 use crate::supervision::envelope;
 use crate::supervision::fault::Fault;
+use crate::supervision::finding::Finding;
 use crate::table::SwingUp;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
@@ -100,6 +100,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// Predicts the next tick of balancing.
     pub(super) fn predict_balancing(&mut self) {
         let (detection, test) = (&mut self.detection, &self.table.thresholds.motor);
-        self.controller.predict_with(|corrected, force| detection.finish_tick(test, corrected, force));
+        self.controller
+            .predict_with(|counts, corrected, force| detection.finish_tick(test, counts, corrected, force));
     }
 }

@@ -129,7 +129,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let end = playback.now().x.as_slice().first().copied().unwrap_or_default();
         let (detection, test) = (&mut self.detection, &motions.thresholds.motor);
         self.controller.predict_on_reference(
-            |corrected, force| detection.finish_tick(test, corrected, force),
+            |counts, corrected, force| detection.finish_tick(test, counts, corrected, force),
             |state, force| swing_up.predict(state, force, tick_s),
         );
         if self.supervisor.state() == State::Holding {

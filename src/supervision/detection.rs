@@ -48,6 +48,12 @@ pub struct Detection<const NY: usize> {
     sums: MotorSums,
     /// The same with a longer memory, while a hand may push.
     long: MotorSums,
+    /// Whether a hand may push in this tick.
+    may_be_pushed: bool,
+    /// Innovation for the motor's test in this tick (m or rad).
+    motor_error: f32,
+    /// What the motor's test has found after the last tick, where a hand may push.
+    lacks_force: bool,
     rejected: u32,
 }
 
@@ -104,6 +110,9 @@ impl<const NY: usize> Default for Detection<NY> {
             missing: [0.0; 2],
             sums: MotorSums::default(),
             long: MotorSums::default(),
+            may_be_pushed: false,
+            motor_error: 0.0,
+            lacks_force: false,
             rejected: 0,
         }
     }
@@ -119,11 +128,12 @@ impl<const NY: usize> Detection<NY> {
 
     /// Restarts the tests at positions `y` (m or rad); the number of rejected measurements stays.
     pub fn start(&mut self, counts: &[i32; NY], y: &[f32; NY]) {
-        let pushes = Pushes::at(counts);
-        *self = Self { rejected: self.rejected(), motor_sensor: self.motor_sensor, pushes, ..Self::default() };
         for ((sensor, &counts), &corrected) in self.sensors.iter_mut().zip(counts).zip(y) {
-            (sensor.counts, sensor.corrected) = (counts, corrected);
+            *sensor = SensorMemory { counts, corrected, ..SensorMemory::default() };
         }
+        self.pushes.start();
+        (self.sums, self.long) = (MotorSums::default(), MotorSums::default());
+        (self.missing, self.motor_error, self.lacks_force) = ([0.0; 2], 0.0, false);
     }
 
     /// Tests the innovation `e = y - C x̂⁻` of a tick (m or rad); sets that of an implausible measurement to 0.
@@ -137,8 +147,8 @@ impl<const NY: usize> Detection<NY> {
         y: &[f32; NY],
         e: &mut [f32; NY],
     ) -> Option<Finding> {
-        let survives_pushes = thresholds.survives_pushes();
-        let found = if survives_pushes {
+        self.may_be_pushed = thresholds.survives_pushes();
+        let found = if self.may_be_pushed {
             self.pushes.test(thresholds, counts, e)
         } else {
             PushFindings { encoder: self.test_sensors(thresholds, counts, y, e), push: None }
@@ -146,7 +156,14 @@ impl<const NY: usize> Detection<NY> {
         // The innovation of a rejected measurement is 0: it says nothing about the motor.
         // With constant indices, the processor has no bound to check.
         let e_motor = if self.motor_sensor == 0 { e.first() } else { e.get(1) };
-        let motor = self.test_motor(&thresholds.motor, e_motor.copied().unwrap_or_default(), survives_pushes);
+        self.motor_error = e_motor.copied().unwrap_or_default();
+        let lacks_force = if self.may_be_pushed {
+            self.lacks_force
+        } else {
+            self.sums.add(KEEP, self.motor_error, self.missing[0]);
+            self.sums.lacks(thresholds.motor.ratio, thresholds.motor.energy)
+        };
+        let motor = lacks_force.then_some(Finding { fault: Fault::Motor, sensor: self.motor_sensor });
         found.encoder.or(motor).or(found.push)
     }
 
@@ -209,29 +226,37 @@ impl<const NY: usize> Detection<NY> {
         implausible.map(|sensor| Finding { fault, sensor })
     }
 
+    /// Whether most of the force is missing, as with a dead motor, or about twice the force, as with one that is stuck.
     #[inline]
-    fn test_motor(&mut self, test: &MotorTest, e: f32, survives_pushes: bool) -> Option<Finding> {
-        let [missing, _] = self.missing;
+    fn finds_missing_force(&mut self, test: &MotorTest) -> bool {
+        let (e, [missing, _]) = (self.motor_error, self.missing);
         self.sums.add(KEEP, e, missing);
-        let found = if survives_pushes {
-            self.long.add(KEEP_LONG, e, missing);
-            let [least, most] = STUCK;
-            // A steady error of the model adds up with the square root of the memory.
-            let dead = self.long.lacks(test.ratio, LONG_MEMORY / MEMORY * test.energy);
-            let stuck = self.sums.lacks(least, test.energy) && !self.sums.lacks(most, test.energy);
-            (dead && self.long.is_explained(EXPLAINED)) || (stuck && self.sums.is_explained(STUCK_EXPLAINED))
-        } else {
-            self.sums.lacks(test.ratio, test.energy)
-        };
-        found.then_some(Finding { fault: Fault::Motor, sensor: self.motor_sensor })
+        self.long.add(KEEP_LONG, e, missing);
+        let [least, most] = STUCK;
+        // A steady error of the model adds up with the square root of the memory.
+        let dead = self.long.lacks(test.ratio, LONG_MEMORY / MEMORY * test.energy);
+        let stuck = self.sums.lacks(least, test.energy) && !self.sums.lacks(most, test.energy);
+        (dead && self.long.is_explained(EXPLAINED)) || (stuck && self.sums.is_explained(STUCK_EXPLAINED))
     }
 
     /// Second half of a tick: stores the corrected estimate of the sensors' positions (m or rad) and the force `u` (N)
-    /// that acts during this tick.
+    /// that acts during this tick. Where a hand may push, it also does what the next output need not wait for: it notes
+    /// which counters stand still, and tests the motor, whose fault then comes in the next tick.
     #[inline]
-    pub fn finish_tick(&mut self, test: &MotorTest, corrected: [f32; NY], u: f32) {
-        for (sensor, corrected) in self.sensors.iter_mut().zip(corrected) {
-            sensor.corrected = corrected;
+    pub fn finish_tick(
+        &mut self,
+        test: &MotorTest,
+        counts: &[i32; NY],
+        corrected: &dyn Fn() -> [f32; NY],
+        u: f32,
+    ) {
+        if self.may_be_pushed {
+            self.pushes.finish_tick(counts);
+            self.lacks_force = self.finds_missing_force(test);
+        } else {
+            for (sensor, corrected) in self.sensors.iter_mut().zip(corrected()) {
+                sensor.corrected = corrected;
+            }
         }
         let ([p, v], [pp, pv, vp, vv], [b_p, b_v]) = (self.missing, test.a, test.b);
         self.missing = [pp * p + pv * v - b_p * u, vp * p + vv * v - b_v * u];
@@ -273,7 +298,7 @@ mod tests {
         detection.start(&[0; 2], &[0.0; 2]);
         (1..100).find_map(|tick| {
             let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut of(tick));
-            detection.finish_tick(&THRESHOLDS.motor, [tick as f32; 2], 0.0);
+            detection.finish_tick(&THRESHOLDS.motor, &[tick; 2], &|| [tick as f32; 2], 0.0);
             found.map(|finding| (tick, finding))
         })
     }
@@ -316,7 +341,7 @@ mod tests {
             // The observer keeps following the measurement: every tick it predicts the same motion again.
             let mut e = [0.0, -per_tick];
             let found = detection.test(&THRESHOLDS, &[tick, 0], &[tick as f32, 0.0], &mut e);
-            detection.finish_tick(&THRESHOLDS.motor, [tick as f32, 0.0], 0.0);
+            detection.finish_tick(&THRESHOLDS.motor, &[tick; 2], &|| [tick as f32, 0.0], 0.0);
             found.map(|finding| (tick, finding))
         })
     }
@@ -338,7 +363,7 @@ mod tests {
             let mut e = [-missing * force, 0.0];
             let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
             force = if tick % 4 < 2 { 0.4 } else { -0.4 };
-            detection.finish_tick(&THRESHOLDS.motor, [tick as f32; 2], force);
+            detection.finish_tick(&THRESHOLDS.motor, &[tick; 2], &|| [tick as f32; 2], force);
             found.map(|finding| (tick, finding))
         })
     }
@@ -354,7 +379,7 @@ mod tests {
             (1..100).find_map(|tick| {
                 let mut e = [-missing * 0.6, 0.0];
                 let found = detection.test(&THRESHOLDS, &[tick; 2], &[tick as f32; 2], &mut e);
-                detection.finish_tick(&THRESHOLDS.motor, [tick as f32; 2], 0.6);
+                detection.finish_tick(&THRESHOLDS.motor, &[tick; 2], &|| [tick as f32; 2], 0.6);
                 found.map(|finding| finding.fault)
             })
         };
@@ -374,7 +399,7 @@ mod tests {
             let mut e = [-missing * force + by_hand, 0.0];
             let found = detection.test(&thresholds, &[2 * tick; 2], &[tick as f32; 2], &mut e);
             force = if tick % 4 < 2 { force_n } else { -force_n };
-            detection.finish_tick(&thresholds.motor, [tick as f32; 2], force);
+            detection.finish_tick(&thresholds.motor, &[tick; 2], &|| [tick as f32; 2], force);
             found.map(|finding| (tick, finding))
         })
     }

@@ -26,9 +26,13 @@ pub(super) struct Pushes<const NY: usize> {
     accepted: [f32; NY],
     /// Whether every innovation was within its threshold in the last tick.
     was_calm: bool,
+    /// Whether [`finish_tick`](Self::finish_tick) has to note which counters stand still.
+    is_calm: bool,
+    /// Whether the state of the sensors is that of these tests, not of earlier ones.
+    is_started: bool,
     /// Number of ticks since the start; it wraps around.
     ticks: u32,
-    /// Number of measurements rejected since the start.
+    /// Number of rejected measurements.
     rejected: u32,
 }
 
@@ -54,7 +58,15 @@ struct PushedSensor {
 impl<const NY: usize> Default for Pushes<NY> {
     fn default() -> Self {
         let sensors = [PushedSensor::default(); NY];
-        Self { sensors, accepted: [0.0; NY], was_calm: true, ticks: 0, rejected: 0 }
+        Self {
+            sensors,
+            accepted: [0.0; NY],
+            was_calm: true,
+            is_calm: false,
+            is_started: false,
+            ticks: 0,
+            rejected: 0,
+        }
     }
 }
 
@@ -68,13 +80,10 @@ pub(super) struct PushFindings {
 }
 
 impl<const NY: usize> Pushes<NY> {
-    /// Tests that begin at these counts.
-    pub(super) fn at(counts: &[i32; NY]) -> Self {
-        let mut pushes = Self::default();
-        for (sensor, &counts) in pushes.sensors.iter_mut().zip(counts) {
-            sensor.lowest = counts;
-        }
-        pushes
+    /// Restarts the tests; the number of rejected measurements stays. The first tick resets the rest, which its output
+    /// need not wait for.
+    pub(super) fn start(&mut self) {
+        (self.was_calm, self.is_calm, self.is_started) = (true, false, false);
     }
 
     /// Number of measurements rejected since the start.
@@ -95,21 +104,45 @@ impl<const NY: usize> Pushes<NY> {
         counts: &[i32; NY],
         e: &mut [f32; NY],
     ) -> PushFindings {
-        self.ticks = self.ticks.wrapping_add(1);
         let mut is_calm = true;
-        let measured = counts.iter().zip(e.iter()).zip(&thresholds.innovation);
-        for (memory, ((&counts, &e), &limit)) in self.sensors.iter_mut().zip(measured) {
-            memory.watch(counts, e, self.ticks);
+        for (e, limit) in e.iter().zip(&thresholds.innovation) {
             // False for NaN, too.
-            is_calm &= e.abs() <= limit;
+            is_calm &= e.abs() <= *limit;
         }
+        self.is_calm = is_calm && self.was_calm;
         // Within the threshold, no test of a sensor can fail.
-        if is_calm && self.was_calm {
+        if self.is_calm {
             self.accepted = *e;
             return PushFindings::default();
         }
         self.was_calm = is_calm;
+        self.watch(counts, e);
         self.test_sensors(thresholds, e)
+    }
+
+    /// Notes which counters stand still, if the tick was calm.
+    #[inline]
+    pub(super) fn finish_tick(&mut self, counts: &[i32; NY]) {
+        if self.is_calm {
+            self.watch(counts, &{ self.accepted });
+        }
+    }
+
+    /// Notes which counters stand still, from the first tick on.
+    fn watch(&mut self, counts: &[i32; NY], e: &[f32; NY]) {
+        if !self.is_started {
+            for (sensor, &lowest) in self.sensors.iter_mut().zip(counts) {
+                *sensor = PushedSensor { lowest, ..PushedSensor::default() };
+            }
+            (self.is_started, self.ticks) = (true, 0);
+            if !self.is_calm {
+                self.accepted = [0.0; NY];
+            }
+        }
+        self.ticks = self.ticks.wrapping_add(1);
+        for (memory, (&counts, &e)) in self.sensors.iter_mut().zip(counts.iter().zip(e)) {
+            memory.watch(counts, e, self.ticks);
+        }
     }
 
     /// Tests each sensor, of which at least one is, or was, beyond its threshold.
@@ -193,10 +226,11 @@ mod tests {
 
     /// The first finding and its tick, for the counts and innovations `of` each tick.
     fn first_at(of: impl Fn(i32) -> ([i32; 2], [f32; 2])) -> Option<(i32, Finding)> {
-        let mut pushes = Pushes::at(&[0; 2]);
+        let mut pushes = Pushes::default();
         (1..1000).find_map(|tick| {
             let (counts, mut e) = of(tick);
             let found = pushes.test(&THRESHOLDS, &counts, &mut e);
+            pushes.finish_tick(&counts);
             found.encoder.or(found.push).map(|finding| (tick, finding))
         })
     }
@@ -239,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_rejected_measurement_has_no_innovation_and_is_counted() {
-        let mut pushes = Pushes::at(&[0; 2]);
+        let mut pushes = Pushes::default();
         let mut e = [7.0, 0.5];
         assert_eq!(pushes.test(&THRESHOLDS, &[7, 1], &mut e).encoder, None);
         assert_eq!((e, pushes.rejected()), ([0.0, 0.5], 1));
@@ -250,7 +284,7 @@ mod tests {
     #[test]
     fn a_counter_with_at_most_two_values_is_frozen_once_the_model_has_moved_on() {
         let growing = |tick: i32| [0.0, 0.08 * tick as f32];
-        let frozen = Some((14, finding(Fault::Frozen, 1)));
+        let frozen = Some((13, finding(Fault::Frozen, 1)));
         assert_eq!(first_at(|tick| ([2 * tick, 7], growing(tick))), frozen);
         // An open wire: the count alternates between two values.
         assert_eq!(first_at(|tick| ([2 * tick, i32::MIN + tick % 2], growing(tick))), frozen);

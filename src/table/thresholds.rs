@@ -46,7 +46,12 @@ impl MotorTest {
 impl<const NY: usize> Thresholds<NY> {
     /// Thresholds that are never exceeded.
     pub const fn none() -> Self {
-        Self { innovation: [f32::MAX; NY], frozen: [f32::MAX; NY], push: [f32::MAX; NY], motor: MotorTest::NONE }
+        Self {
+            innovation: [f32::MAX; NY],
+            frozen: [f32::MAX; NY],
+            push: [f32::MAX; NY],
+            motor: MotorTest::NONE,
+        }
     }
 
     /// Whether pushes by hand are told from defects.

@@ -41,13 +41,13 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
     #[inline(always)]
     pub fn predict_on_reference(
         &mut self,
-        finish: impl FnOnce([f32; NY], f32),
+        finish: impl FnOnce(&[i32; NY], &dyn Fn() -> [f32; NY], f32),
         predict: impl FnOnce(&mut [f32; NX], f32),
     ) {
         let force = self.acting();
         let estimate = &mut self.estimate.data.0[0];
         if let Mode::Running(observer) = &self.mode {
-            finish(observer.measured(estimate), force);
+            finish(self.encoders.counts(), &|| observer.measured(estimate), force);
         }
         predict(estimate, self.applied);
     }

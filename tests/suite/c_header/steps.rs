@@ -131,8 +131,8 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
             duty: pulses as u32,
             values: numbers.iter().chain(estimate).map(|value| value.to_bits()).collect(),
         };
-        self.controller.predict_with(|corrected, force| {
-            self.detection.finish_tick(&self.table.thresholds.motor, corrected, force);
+        self.controller.predict_with(|counts, corrected, force| {
+            self.detection.finish_tick(&self.table.thresholds.motor, counts, corrected, force);
         });
         (answer, pulses)
     }

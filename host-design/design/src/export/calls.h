@@ -170,7 +170,9 @@ UPRIGHT_CALL void upright_predict(upright_controller *c)
         }
         c->pending_n = c->applied_n;
     }
-#if !UPRIGHT_HAS_PUSHES
+#if UPRIGHT_HAS_PUSHES
+    c->lacks_force = upright_lacks_force(c);
+#else
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
         c->sensors[i].corrected = c->estimate[upright_table.measured[i]];
     }

@@ -66,6 +66,7 @@ typedef struct {
     upright_motor_sums sums; /* over 16 ticks */
 #if UPRIGHT_HAS_PUSHES
     upright_motor_sums long_sums; /* over 256 ticks */
+    bool lacks_force;             /* what the motor's test has found after the last tick */
 #endif
 } upright_controller;
 
@@ -219,6 +220,7 @@ static inline void upright_start(upright_controller *c)
     memset(&c->sums, 0, sizeof c->sums);
 #if UPRIGHT_HAS_PUSHES
     memset(&c->long_sums, 0, sizeof c->long_sums);
+    c->lacks_force = false;
 #endif
     c->integral = c->pending_n = c->last_volts = 0.0f;
     c->saturated = 0;

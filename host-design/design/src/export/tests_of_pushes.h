@@ -103,7 +103,6 @@ static inline upright_fault upright_test(upright_controller *c, const float *y, 
             }
         }
     }
-    bool lacks_force = upright_lacks_force(c);
     if (jumped < UPRIGHT_SENSORS) {
         *sensor = jumped;
         return UPRIGHT_ENCODER;
@@ -112,7 +111,7 @@ static inline upright_fault upright_test(upright_controller *c, const float *y, 
         *sensor = frozen;
         return UPRIGHT_FROZEN;
     }
-    if (lacks_force) {
+    if (c->lacks_force) {
         *sensor = UPRIGHT_MOTOR_SENSOR;
         return UPRIGHT_MOTOR;
     }

@@ -99,8 +99,8 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
         match &mut self.supervision {
             None => self.controller.predict(),
             Some(BalancingSupervision { detection, .. }) => {
-                self.controller.predict_with(|corrected, force| {
-                    detection.finish_tick(&self.table.thresholds.motor, corrected, force);
+                self.controller.predict_with(|counts, corrected, force| {
+                    detection.finish_tick(&self.table.thresholds.motor, counts, corrected, force);
                 })
             }
         }

@@ -167,7 +167,7 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> MotionRun<'t, NX, NY,
             reached.note(estimate.as_slice(), (estimate - playback.now().x).as_slice());
             bench.tick(command.drive);
             controller.predict_on_reference(
-                |corrected, force| detection.finish_tick(&nothing.motor, corrected, force),
+                |counts, corrected, force| detection.finish_tick(&nothing.motor, counts, corrected, force),
                 |state, force| SwingUp::<NX, NY>::predict(self.swing_up, state, force, self.tick_s),
             );
             if playback.advance() {
