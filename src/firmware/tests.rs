@@ -183,23 +183,26 @@ fn cause_of(faults: &[Fault], ticks_of_a_pass: u32) -> Option<Cause> {
     firmware.start_balancing(&[0; SENSORS]);
     // To make the controller request a force that the motor test can find missing.
     firmware.controller.set_setpoint(0.5).unwrap();
-    // The missing force of a single tick explains the jump of the cart in the last one.
+    // The missing force of a single tick explains the jump of the cart in the next one, at whose end it is found.
     let mut unmoved = calm;
     unmoved.thresholds.motor.b = [0.0; 2];
+    let mut lacking = calm;
+    lacking.thresholds.motor = strict.thresholds.motor;
     let mut inputs = INPUTS;
     let show = |inputs: &mut Inputs<SENSORS>, tick: u32| {
         inputs.contacts.overrun = due(Fault::Overrun) && tick >= LAST_THREE;
         inputs.supply_v = if due(Fault::Supply) && tick >= LAST_THREE { -1.0 } else { INPUTS.supply_v };
         let [cart, first, second, ..] = &mut inputs.raw_counts;
-        *cart = if due(Fault::Motor) && tick == TICKS { 20 } else { 0 };
+        *cart = if due(Fault::Motor) && tick >= TICKS - 1 { 20 } else { 0 };
         *first = if due(Fault::Encoder) && tick >= LAST_THREE { 500 } else { 0 };
         // About 1.5 mrad per tick, which is no jump.
         *second = if due(Fault::Disturbed) { (tick + 2).saturating_sub(LAST_THREE) } else { 0 };
     };
     for tick in 1..TICKS {
         show(&mut inputs, tick);
-        firmware.table = if tick < TICKS - 1 { &unmoved } else { &calm };
+        firmware.table = if tick < TICKS - 2 { &unmoved } else { &calm };
         firmware.control(&inputs);
+        firmware.table = if tick == TICKS - 1 { &lacking } else { firmware.table };
         firmware.finish(None, 0);
         assert_eq!(firmware.state(), State::Balancing, "{:?}", firmware.cause());
     }
