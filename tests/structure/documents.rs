@@ -53,7 +53,8 @@ fn is_dated(result: &str) -> bool {
         parts.iter().map(|part| part.len()).eq([4, 2, 2])
             && parts.iter().all(|part| part.bytes().all(|byte| byte.is_ascii_digit()))
     };
-    let names_a_command = ["`cargo ", "`upright ", "docs/results/make "].iter().any(|words| first.contains(words));
+    let names_a_command =
+        ["`cargo ", "`upright ", "docs/results/make "].iter().any(|words| first.contains(words));
     first.split_whitespace().any(is_day) && names_a_command
 }
 
