@@ -25,6 +25,14 @@ fn pages(folder: &Path) -> Vec<(String, String)> {
     pages.map(|path| (path.display().to_string(), std::fs::read_to_string(&path).unwrap())).collect()
 }
 
+/// The pages of results, without their index.
+fn results() -> Vec<(String, String)> {
+    let mut results = pages(&super::root().join("docs/results"));
+    results.retain(|(name, _)| !name.ends_with("README.md"));
+    assert!(results.len() > 10);
+    results
+}
+
 /// What is too long, a line each.
 fn too_long(guides: &[(String, String)]) -> Vec<String> {
     let counts: Vec<(&str, usize)> = guides.iter().map(|(name, text)| (name.as_str(), words(text))).collect();
@@ -45,8 +53,31 @@ fn is_dated(result: &str) -> bool {
         parts.iter().map(|part| part.len()).eq([4, 2, 2])
             && parts.iter().all(|part| part.bytes().all(|byte| byte.is_ascii_digit()))
     };
-    let names_a_command = ["`cargo ", "`upright ", "the command"].iter().any(|words| first.contains(words));
+    let names_a_command =
+        ["`cargo ", "`upright ", "docs/results/make "].iter().any(|words| first.contains(words));
     first.split_whitespace().any(is_day) && names_a_command
+}
+
+/// The lines that no command writes: tables outside of what a test compares, and blocks of text that are empty or have
+/// no commands before them, whose output `docs/results/make` puts there.
+fn written_by_hand(result: &str) -> Vec<&str> {
+    let (mut last_block, mut is_inside, mut is_compared, mut found) = ("", false, false, Vec::new());
+    for (before, line) in std::iter::once("").chain(result.lines()).zip(result.lines()) {
+        if let Some(mark) = line.strip_prefix("<!-- ") {
+            is_compared = !mark.starts_with('/');
+        }
+        if line.starts_with("```") {
+            is_inside = !is_inside;
+            let is_made = last_block == "```sh (makes the text below)";
+            if is_inside && line == "```text" && !is_made || !is_inside && before == "```text" {
+                found.push(line);
+            }
+            last_block = if is_inside { line } else { last_block };
+        } else if line.starts_with('|') && !is_inside && !is_compared {
+            found.push(line);
+        }
+    }
+    found
 }
 
 #[test]
@@ -84,12 +115,27 @@ fn tables_that_a_test_compares_are_not_counted() {
 
 #[test]
 fn every_result_says_when_and_how_it_was_made() {
-    let results = pages(&super::root().join("docs/results"));
-    assert!(results.len() > 3);
-    for (name, text) in results {
+    for (name, text) in results() {
         assert!(is_dated(&text), "{name}: the first paragraph has no day, or no command");
     }
     assert!(is_dated("# Results\n\nMade on 2026-11-26 by `cargo upright coverage`.\n"));
     assert!(!is_dated("# Results\n\nMade in November 2026 by `cargo upright coverage`.\n"));
     assert!(!is_dated("# Results\n\nMade on 2026-11-26.\n"));
+}
+
+#[test]
+fn every_number_in_a_table_of_results_is_written_by_a_command() {
+    // These take hours of processor time, and still have tables that were put together from several runs.
+    let is_made = |name: &str| {
+        !["identified.md", "commission.md", "studies.md"].iter().any(|page| name.ends_with(page))
+    };
+    for (name, text) in results().into_iter().filter(|(name, _)| is_made(name)) {
+        assert_eq!(written_by_hand(&text), [""; 0], "{name}: see docs/results/make");
+    }
+    let made = "```sh (makes the text below)\ncargo upright verify RIG\n```\n\n```text\n1 | 2\n```\n";
+    assert_eq!(written_by_hand(made), [""; 0]);
+    assert_eq!(written_by_hand(&made.replace(" (makes the text below)", "")), ["```text"]);
+    assert_eq!(written_by_hand(&format!("{made}\n```text\n3\n```\n")), ["```text"]);
+    assert_eq!(written_by_hand(&made.replace("1 | 2\n", "")), ["```"]);
+    assert_eq!(written_by_hand("<!-- chips -->\n| 1 |\n<!-- /chips -->\n| 2 |\n"), ["| 2 |"]);
 }

@@ -8,7 +8,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
-use upright_tool::image::{BoardName, CODE_LIMIT, RAM_LIMIT};
+use upright_tool::image::{BoardName, CODE_LIMIT, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, RAM_LIMIT};
 use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
@@ -271,6 +271,20 @@ fn the_readme_shows_what_design_prints() {
         assert!(shown_by(line), "README.md: `design` does not print\n{line}");
     }
     assert!(!shown_by("K       3.16228  3.68443"));
+}
+
+fn ticks_of_a_pico() -> String {
+    let head = "| links | balancing (cycles) | following a motion (cycles) |\n|---|---|---|\n".to_owned();
+    let rows = (1..).zip(PICO_BALANCING_CYCLES.iter().zip(PICO_MOTION_CYCLES));
+    rows.fold(head, |table, (links, (balancing, motion))| {
+        table + &format!("| {links} | {balancing} | {motion} |\n")
+    })
+}
+
+/// The tests in the emulator compare these numbers with what they measure.
+#[test]
+fn the_page_about_the_pico_holds_the_ticks_of_the_source() {
+    hold("docs/results/pico.md", "ticks", &ticks_of_a_pico());
 }
 
 #[test]

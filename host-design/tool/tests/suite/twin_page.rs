@@ -306,9 +306,10 @@ fn a_minute_of_running_needs_no_more_memory() {
     assert!(work_ms < 1e3 / 60.0, "scripts and layout take {work_ms} ms for each frame");
 }
 
-/// Memory of the server (KiB); 1 where the system does not tell.
+/// Memory of the server without the pages of its file, which the system drops and loads again as it likes (KiB); 1
+/// where the system does not tell.
 fn resident_kib(twin: &Twin) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", twin.process.id())).unwrap_or_default();
-    let line = status.lines().find(|line| line.starts_with("VmRSS"));
+    let line = status.lines().find(|line| line.starts_with("RssAnon"));
     line.and_then(|line| line.split_whitespace().nth(1)).and_then(|value| value.parse().ok()).unwrap_or(1)
 }
