@@ -36,7 +36,8 @@ pub(super) fn pushed(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>) -> O
     for arms_m in places(chain) {
         let turned = &plant.torque_inputs * &arms_m;
         let input = &plant.b + &turned;
-        let push = HandPush::new(&zero_order_hold(&plant.a, &input, &rig.tick.period_s).1, &pushed_loop, kalman);
+        let push =
+            UnitPush::new(&zero_order_hold(&plant.a, &input, &rig.tick.period_s).1, &pushed_loop, kalman);
         let mut force_n = limit;
         for (_, law) in laws.present() {
             for duration_s in DURATIONS_S {
@@ -97,14 +98,14 @@ fn hardest(mut force_n: f64, is_survived: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// What a push of 1 N does that begins in the first tick and does not end.
-struct HandPush {
+struct UnitPush {
     /// Change of the state in a tick.
     held: Vec<f64>,
     /// Innovation of each sensor (m or rad), and error of the corrected estimate, in each tick.
     response: Vec<[Vec<f64>; 2]>,
 }
 
-impl HandPush {
+impl UnitPush {
     fn new(held: &Matrix<f64>, pushed_loop: &PushedLoop<'_>, kalman: &Kalman<f64>) -> Self {
         let rig = pushed_loop.rig;
         let sensors = rig.sensors();
@@ -165,7 +166,7 @@ impl Limits {
 
 impl PushedLoop<'_> {
     /// Whether no limit is exceeded when the rig is pushed from rest with this force for `lasts` ticks.
-    fn survives(&self, law: &Feedback<f64>, push: &HandPush, lasts: usize, force_n: f64) -> bool {
+    fn survives(&self, law: &Feedback<f64>, push: &UnitPush, lasts: usize, force_n: f64) -> bool {
         let is_late = self.rig.tick.delay_ticks == 1;
         let mut state = vec![0.0; push.held.len()];
         let mut pending = 0.0;

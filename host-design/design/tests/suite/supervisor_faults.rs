@@ -259,8 +259,8 @@ fn a_motor_stuck_at_full_force_is_off_within_fifty_ticks() {
         |_| vec![Defect::MotorStuck],
         1200,
         |what, rig, defect, outcome| {
-            found_in_time(what, rig, defect, outcome);
-            assert!(outcome.fault.is_some_and(|(_, ticks)| ticks <= 50), "{what}");
+            let found = outcome.fault.is_some_and(|(fault, ticks)| is_of_innovation(fault) && ticks <= 50);
+            assert!(found && outcome.lean_rad < 0.6 * rig.limits.angle_rad.unwrap(), "{what} {defect:?}");
         },
     );
 }
