@@ -104,7 +104,7 @@ fn an_arduino_uno_has_the_bits_of_the_firmware_in_no_more_cycles_than_documented
     let [mean, worst] = on_the_uno("single-quanser-ip02", 10_000);
     assert!(mean <= 18_070 && worst <= 19_140, "{mean} {worst}");
     let [mean, worst] = on_the_uno("quadruple-paper", 500);
-    assert!(mean <= 59_000 && worst <= 60_800, "{mean} {worst}");
+    assert!(mean <= 59_070 && worst <= 60_000, "{mean} {worst}");
 }
 
 /// A sketch of the examples, or a file beside it.
