@@ -68,22 +68,6 @@ pub(super) fn check(sensors: usize, tick_s: f64, has_motions: bool) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
-
-    #[test]
-    fn the_guide_has_the_cycles_that_the_check_uses() {
-        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-        let guide = std::fs::read_to_string(Path::new(root).join("docs/results/pico.md")).unwrap();
-        for links in 0..4 {
-            let cell = |cycles: u32| {
-                let ms = f64::from(cycles) / CLOCK_HZ * 1e3;
-                format!("{},{:03} cycles, {ms:.2} ms", cycles / 1000, cycles % 1000)
-            };
-            let (balancing, motion) = (PICO_BALANCING_CYCLES[links], PICO_MOTION_CYCLES[links]);
-            let row = format!("| {} | {} | {} |", links + 1, cell(balancing), cell(motion));
-            assert!(guide.contains(&row), "docs/results/pico.md: {row}");
-        }
-    }
 
     #[test]
     fn what_a_pico_cannot_do_is_refused_with_the_numbers() {
