@@ -1,12 +1,14 @@
 //! Defects in a jog.
 
+use upright::board::Output;
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
 use upright_design::defects::{Expected, Injection};
-use upright_design::harness::{Harness, HarnessError};
+use upright_design::harness::{Harness, HarnessError, Session};
 
-use super::attempt::DefectRun;
+use super::attempt::{DefectRun, spoil};
 use super::observed::Observed;
 
 /// Longest time from pressing the key until the motor is on (s).
@@ -42,18 +44,24 @@ impl DefectRun<'_> {
             if since == Some(0) {
                 injection.serial(&mut harness.session);
             }
+            let is_on = self.is_jogging(&harness.session, &output);
             tick = match tick {
                 Some(tick) => Some(tick + 1),
-                None => output.enable.then_some(0),
+                None => is_on.then_some(0),
             };
             if is_there_before && output.enable {
                 let mut acting = output;
                 if let Some(since) = since {
-                    injection.output(since, &mut acting);
+                    spoil(harness, &mut injection, since, &mut acting);
                 }
                 harness.bench.tick(acting.drive);
                 held[0] = harness.bench.state()[0];
             } else {
+                if self.table.steps.is_some() {
+                    // A hand holds the links, but not a cart that goes where its pulses say.
+                    harness.bench.tick(output.drive);
+                    held[0] = harness.bench.state()[0];
+                }
                 harness.bench.hold(&held);
             }
             let Some(tick) = tick else {
@@ -62,7 +70,8 @@ impl DefectRun<'_> {
                 }
                 continue;
             };
-            observed.output(tick, output, output.enable, false);
+            let was_told = self.table.steps.is_some() && output.enable;
+            observed.output(tick, output, is_on, was_told);
             observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = harness.session.fault();
@@ -73,6 +82,11 @@ impl DefectRun<'_> {
         }
         self.after_jog(harness, &mut observed)?;
         Ok(observed)
+    }
+
+    /// Whether the motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
+    fn is_jogging(&self, session: &Session<'_>, output: &Output) -> bool {
+        output.enable && (self.table.steps.is_none() || session.status().state == State::Jogging)
     }
 
     /// Checks the signs by hand, and lets the links hang still, wherever the cart is; returns that state.
