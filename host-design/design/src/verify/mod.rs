@@ -44,7 +44,7 @@ pub(crate) use corners::first_mass;
 pub(crate) use covariance::stationary;
 pub(crate) use error::chain;
 pub(crate) use loop_model::{Numbers, radius};
-pub(crate) use trial::{disturbed, leaning};
+pub(crate) use trial::{disturbed, leaning, waking_lean};
 
 pub use attraction::{
     Attraction, AttractionSettings, Edge, Map, MapAxis, Tilt, WorstTilt, attraction, attraction_map,

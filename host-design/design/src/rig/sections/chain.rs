@@ -80,6 +80,16 @@ impl CartInput {
     pub fn is_force(&self) -> bool {
         *self == CartInput::Force
     }
+
+    /// Its unit.
+    pub fn unit(&self) -> &'static str {
+        if self.is_force() { "N" } else { "m/s²" }
+    }
+
+    /// The key of its weight in `[lqr]`.
+    pub fn weight_key(&self) -> &'static str {
+        if self.is_force() { "force_weight" } else { "acceleration_weight" }
+    }
 }
 
 impl Table<'_> {
