@@ -60,8 +60,9 @@ pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
-    Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, OfBristle, RequiredSurvival,
-    SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections, survival,
+    Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, LeftOut, OfBristle,
+    RequiredSurvival, SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections,
+    survival,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};

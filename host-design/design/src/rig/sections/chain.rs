@@ -106,7 +106,7 @@ impl Table<'_> {
         match keys.iter().find_map(|key| self.get(key)) {
             Some(node) => Err(node.out_of_range(
                 "only with kind = \"force\" in [actuator]",
-                "leave it out: a drive that imposes the cart's acceleration is not affected",
+                "leave it out: of a drive that imposes the cart's acceleration, it changes nothing that is simulated",
             )),
             None => Ok(()),
         }
