@@ -126,8 +126,8 @@ fn measured(rig: &Rig) -> Vec<usize> {
     rig.sensors().iter().map(|sensor| sensor.state).collect()
 }
 
-/// The plant sampled at its tick. The cart of a drive with pulses is where the observer takes it to be: it decays within
-/// a tick, so that it does not look like two poles at 1.
+/// The plant sampled at its tick. The cart of a drive with pulses is where the observer takes it to be: it decays
+/// within a tick, so that it does not look like two poles at 1.
 fn held(rig: &Rig, ad: &Matrix<f64>, bd: &Matrix<f64>) -> PlantModel<f64> {
     let seen_from = if rig.actuator.input().is_force() { 0 } else { 2 };
     let seen = |matrix: &Matrix<f64>| {

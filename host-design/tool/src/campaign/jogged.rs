@@ -49,21 +49,11 @@ impl DefectRun<'_> {
                 Some(tick) => Some(tick + 1),
                 None => is_on.then_some(0),
             };
-            if is_there_before && output.enable {
-                let mut acting = output;
-                if let Some(since) = since {
-                    spoil(harness, &mut injection, since, &mut acting);
-                }
-                harness.bench.tick(acting.drive);
-                held[0] = harness.bench.state()[0];
-            } else {
-                if self.table.steps.is_some() {
-                    // A hand holds the links, but not a cart that goes where its pulses say.
-                    harness.bench.tick(output.drive);
-                    held[0] = harness.bench.state()[0];
-                }
-                harness.bench.hold(&held);
+            let mut acting = output;
+            if let Some(since) = since.filter(|_| is_there_before && output.enable) {
+                spoil(harness, &mut injection, since, &mut acting);
             }
+            self.move_rig(harness, &acting, &mut held, is_there_before);
             let Some(tick) = tick else {
                 if turn > self.ticks(BEGIN_S) {
                     return Err(HarnessError::NotBalancing(harness.session.status().state));
@@ -82,6 +72,19 @@ impl DefectRun<'_> {
         }
         self.after_jog(harness, &mut observed)?;
         Ok(observed)
+    }
+
+    /// A tick of the rig, which hangs as in `held`: free, or held by a hand, which does not hold a cart that goes where
+    /// its pulses say.
+    fn move_rig(&self, harness: &mut Harness<'_>, output: &Output, held: &mut [f64], is_free: bool) {
+        let is_free = is_free && output.enable;
+        if is_free || self.table.steps.is_some() {
+            harness.bench.tick(output.drive);
+            held[0] = harness.bench.state()[0];
+        }
+        if !is_free {
+            harness.bench.hold(held);
+        }
     }
 
     /// Whether the motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
