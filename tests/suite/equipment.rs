@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use upright_design::rig::Rig;
-use upright_design::table::TableValues;
-use upright_tool::image::{BuildError, ImageKind, build, build_for};
+use upright_design::table::{TableValues, gains_source};
+use upright_test_support::repository;
+use upright_tool::image::{BuildError, Compiler, ImageKind, PROFILE, TARGET, build, build_for, compiler};
 
 pub(crate) use upright_test_support::equipment::in_qemu;
 
@@ -22,4 +23,19 @@ pub(crate) fn built(kind: ImageKind) -> Option<PathBuf> {
 /// The image with this table.
 pub(crate) fn built_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
     if_possible(build_for(kind, rig, table), "an image")
+}
+
+/// Builds the crate in this folder of `boards/` with a table; returns the folder of what was built.
+pub(crate) fn build_crate(name: &str, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
+    let Compiler { mut cargo, target_directory, .. } = compiler()?;
+    let temporary = tempfile::tempdir().unwrap();
+    let gains = temporary.path().join("gains.rs");
+    std::fs::write(&gains, gains_source(rig, table)).unwrap();
+    cargo.current_dir(repository().join("boards").join(name)).env("UPRIGHT_GAINS", gains);
+    cargo.args(["build", "--quiet", "--locked", "--profile", PROFILE, "--target", TARGET]);
+    let output = cargo.output().unwrap();
+    if output.status.success() {
+        return Ok(target_directory.join(TARGET).join(PROFILE));
+    }
+    Err(BuildError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()))
 }

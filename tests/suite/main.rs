@@ -6,6 +6,7 @@ mod c_header;
 mod c_library;
 mod chips;
 mod closed_loop;
+mod embassy;
 mod encoders_only;
 mod equipment;
 mod fuzz_corpus;

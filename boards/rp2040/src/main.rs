@@ -1,4 +1,4 @@
-//! The firmware image for the Raspberry Pi Pico: tasks and their priorities.
+//! The firmware image for the Raspberry Pi Pico and the Pico 2: tasks and their priorities.
 //!
 //! | task | started by | priority | does |
 //! |---|---|---|---|
@@ -26,7 +26,7 @@ const CYCLES_PER_TICK: u32 = {
 const _: () =
     assert!(gains::TABLE.steps.is_none(), "kind = \"acceleration\": this board makes no step pulses");
 
-#[rtic::app(device = rp2040_hal::pac, peripherals = true)]
+#[rtic::app(device = hal::pac, peripherals = true)]
 mod app {
     use heapless::spsc::Queue;
     use upright::board::Board;

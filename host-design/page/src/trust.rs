@@ -6,8 +6,8 @@ use upright_design::number::significant;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_design::verify::{
-    AttractionSettings, IMPERFECTIONS, Imperfection, ImperfectionSettings, LawTrust, VerifyError, attraction,
-    brief, of_size, pushes, rows,
+    AttractionSettings, Imperfection, ImperfectionSettings, LawTrust, VerifyError, attraction, brief,
+    of_size, pushes, rows,
 };
 
 use crate::refusal::PageRefusal;
@@ -15,10 +15,9 @@ use crate::refusal::PageRefusal;
 /// What is found for each law before the imperfections, one a step.
 const PARTS: [&str; 2] = ["region of attraction", "pushes by hand"];
 
-/// Steps of a law. The imperfections are those of a machine that is moved by a force.
+/// Steps of a law.
 fn steps(rig: &Rig) -> usize {
-    let imperfections = if rig.actuator.acceleration.is_some() { 0 } else { IMPERFECTIONS.len() };
-    PARTS.len() + imperfections
+    PARTS.len() + Imperfection::all_of(rig).len()
 }
 
 /// A report that grows with each step; each law has rows for its imperfections, too.
@@ -50,7 +49,7 @@ impl ShortTrust {
                 _ if !is_chain => {}
                 1 => trust.pushes = pushes(rig, table, law)?,
                 part => imperfect.extend(
-                    IMPERFECTIONS
+                    Imperfection::all_of(rig)
                         .get(part - PARTS.len())
                         .map(|one| typical(rig, table, trust, one))
                         .transpose()?,
@@ -65,7 +64,7 @@ impl ShortTrust {
     fn shown(&self, rig: &Rig, step: usize) -> Value {
         let next = self.0.get(step / steps(rig)).map(|(trust, _)| {
             let part = step % steps(rig);
-            let key = |part: usize| IMPERFECTIONS.get(part).map_or("", |imperfection| imperfection.key);
+            let key = |part: usize| Imperfection::all_of(rig).get(part).map_or("", |one| one.key);
             let name = PARTS.get(part).copied().unwrap_or_else(|| key(part - PARTS.len()));
             format!("{name}, {}", trust.linear.law.title())
         });
@@ -155,12 +154,13 @@ mod tests {
     }
 
     #[test]
-    fn a_stepper_is_verified_without_the_imperfections_of_a_machine_with_a_force() {
+    fn a_stepper_is_verified_without_the_imperfections_that_are_not_simulated_with_pulses() {
         let mut desk = Desk::default();
-        let answers: Vec<Value> = (0..3).map(|step| ask(&mut desk, "single-stepper", step)).collect();
-        let last = &answers[2];
+        let answers: Vec<Value> = (0..8).map(|step| ask(&mut desk, "single-stepper", step)).collect();
+        let last = &answers[7];
         let has = |name: &str| last["laws"][0]["rows"].as_array().unwrap().iter().any(|row| row[0] == name);
-        assert!(has("least resonance") && has("push, end of link 1") && !has("joint_friction_n_m"));
-        assert_eq!(last["steps"], json!(1 + 2 * last["laws"].as_array().unwrap().len()));
+        assert!(has("least resonance") && has("push, end of link 1") && has("joint_friction_n_m"));
+        assert!(!has("backlash_m") && !has("cart_friction_n"));
+        assert_eq!((&last["steps"], &last["next"]), (&json!(8), &Value::Null));
     }
 }

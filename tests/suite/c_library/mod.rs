@@ -5,32 +5,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::c_header::can_run_on_cortex_m;
-use crate::equipment::if_possible;
+use crate::equipment::{build_crate, if_possible};
 use crate::pico::recorded::{Recorded, recorded};
 use crate::published::rig_and_table;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::harness::Pins;
-use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
-use upright_design::table::{TableValues, gains_source};
 use upright_test_support::repository;
-use upright_tool::image::{BuildError, Compiler, PROFILE, TARGET, compiler};
 
 fn folder() -> PathBuf {
     repository().join("boards/c-library")
-}
-
-/// Builds the library for this rig; returns its path.
-fn library(rig: &Rig, table: &TableValues, gains: &Path) -> Result<PathBuf, BuildError> {
-    let Compiler { mut cargo, target_directory, .. } = compiler()?;
-    std::fs::write(gains, gains_source(rig, table)).unwrap();
-    cargo.current_dir(folder()).env("UPRIGHT_GAINS", gains);
-    let output =
-        cargo.args(["build", "--quiet", "--locked", "--profile", PROFILE, "--target", TARGET]).output();
-    let output = output.unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Ok(target_directory.join(TARGET).join(PROFILE).join("libupright_c.a"))
 }
 
 /// Compiles the example for this number of sensors, and links it with the library.
@@ -122,7 +107,8 @@ fn a_program_in_c_homes_checks_signs_arms_and_balances_as_the_host_does() {
         return;
     }
     let what = "the firmware as a library for C";
-    let Some(library) = if_possible(library(rig, table, &file("gains.rs")), what) else { return };
+    let Some(built) = if_possible(build_crate("c-library", rig, table), what) else { return };
+    let library = built.join("libupright_c.a");
     let scenario = Scenario { duration_s: 0.5, ..Scenario::at_rest(rig, Law::Lqr) };
     let run_of_host = recorded(rig, table, &scenario, None::<(State, usize, fn(&mut Pins))>);
     let balances = |pins: usize| run_of_host.outputs[pins].enable;

@@ -15,7 +15,7 @@ use upright::table::Law;
 use upright_design::harness::Pins;
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::up_and_down;
-use upright_tool::image::{BuildError, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, build_pico};
+use upright_tool::image::{BuildError, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, PicoBoard, build_pico};
 
 /// Stack of the image (bytes), as `boards/rp2040/image.x` has it.
 const STACK: u32 = 8192;
@@ -192,7 +192,7 @@ fn a_changed_table_keeps_the_motor_off() {
 #[ignore = "builds the image"]
 fn a_rig_with_a_stepper_does_not_compile() {
     let (rig, table) = rig_and_table("single-stepper");
-    let refused = build_pico(rig, table);
+    let refused = build_pico(PicoBoard::Pico, rig, table);
     if let Err(BuildError::Compiler(said)) = &refused {
         return assert!(said.contains("kind = \"acceleration\": this board makes no step pulses"), "{said}");
     }
@@ -217,4 +217,29 @@ fn sums_and_products_are_the_compilers_and_not_those_of_the_rom() {
     }
     // Negative control: what `rp2040-hal` puts in their place without its feature `disable-intrinsics`.
     assert!(!is_compilers(b"\0_RNvNtCs_10rp2040_hal_10intrinsics8___addsf3\0", "__addsf3"));
+}
+
+#[test]
+#[ignore = "builds the image"]
+fn the_image_for_a_pico_2_has_what_its_boot_rom_looks_for() {
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let built = |board| if_possible(build_pico(board, rig, table), "the image for a Pico 2");
+    let Some(image) = built(PicoBoard::Pico2) else { return };
+    // The blocks of the UF2 file, each with a page of the flash.
+    let uf2 = std::fs::read(image.uf2).unwrap();
+    let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    assert!(uf2.chunks(512).all(|block| word(block, 28) == 0xe48b_ff59));
+    let flash: Vec<u8> = uf2.chunks(512).flat_map(|block| block[32..288].iter().copied()).collect();
+    assert_eq!(word(&uf2, 12), 0x1000_0000);
+    assert_eq!(word(&flash, 0), 0x2000_0000 + STACK);
+    // RP2350 datasheet, 5.9: a secure program for the Arm cores, and the only block of its loop.
+    let definition = [0xffff_ded3, 0x1021_0142, 0x0000_01ff, 0, 0xab12_3579];
+    let says_what_it_is = |flash: &[u8]| {
+        let words: Vec<u32> = flash[..4096].chunks(4).map(|bytes| word(bytes, 0)).collect();
+        words.windows(5).any(|words| words == definition)
+    };
+    assert!(says_what_it_is(&flash));
+    // Negative control: what another chip looks for.
+    let Some(pico) = built(PicoBoard::Pico) else { return };
+    assert!(!says_what_it_is(&std::fs::read(pico.uf2).unwrap()));
 }

@@ -4,7 +4,7 @@
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
-use rp2040_hal::pac::WATCHDOG;
+use hal::pac::WATCHDOG;
 use upright::protocol::message::{CrashRecord, Reset, Start};
 use upright::table::checksum::crc32;
 

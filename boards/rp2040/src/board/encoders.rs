@@ -1,7 +1,7 @@
 //! The encoders: state machines count edges, 12.5 million per second each. Four are in PIO 0, the fifth is in PIO 1.
 
-use rp2040_hal::pac::pio0::RegisterBlock;
-use rp2040_hal::pac::{PIO0, PIO1};
+use hal::pac::pio0::RegisterBlock;
+use hal::pac::{PIO0, PIO1};
 use upright::gains::SENSORS;
 
 use super::pins::ENCODERS;

@@ -1,7 +1,7 @@
 //! The dead man's switch: a state machine holds the enable output high only as long as ticks restart it, and while the
 //! emergency stop is closed. It needs no code on the processor.
 
-use rp2040_hal::pac::PIO1;
+use hal::pac::PIO1;
 
 use super::encoders::LENGTH;
 use super::pins::{EMERGENCY_STOP, ENABLE};

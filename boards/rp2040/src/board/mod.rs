@@ -1,8 +1,11 @@
 //! The board: the only code that accesses registers, and the only code with `unsafe`. Sections and tables are those of
-//! the RP2040 datasheet.
+//! the RP2040 datasheet; the RP2350 has the same registers, but for what is in `chip`.
 
 #![allow(unsafe_code)]
 
+#[cfg_attr(not(rp2350), path = "rp2040.rs")]
+#[cfg_attr(rp2350, path = "rp2350.rs")]
+mod chip;
 mod crash;
 mod encoders;
 mod guard;
@@ -14,34 +17,27 @@ mod usb;
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, SYST};
-use rp2040_hal::clocks::init_clocks_and_plls;
-use rp2040_hal::fugit::MicrosDurationU32;
-use rp2040_hal::pac::{Interrupt, Peripherals};
-use rp2040_hal::watchdog::Watchdog;
+use hal::clocks::init_clocks_and_plls;
+use hal::fugit::MicrosDurationU32;
+use hal::pac::{Interrupt, Peripherals};
+use hal::watchdog::Watchdog;
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
 use upright::protocol::message::Start;
 
 use crate::CYCLES_PER_TICK;
+pub(crate) use chip::CLOCK_HZ;
 use encoders::Encoders;
 use motor::Motor;
 use supply::Supply;
 pub(crate) use usb::{UsbLine as SerialLine, UsbMemory};
 
-/// Processor clock (Hz).
-pub(crate) const CLOCK_HZ: u32 = 125_000_000;
-
 /// Shortest and longest tick (µs): a shorter one leaves no time for a controller, and SysTick has 24 bits.
 pub(crate) const TICK_US: [u32; 2] = [500, 100_000];
 
-/// Crystal of the Pico (Hz).
+/// Crystal of both boards (Hz).
 const CRYSTAL_HZ: u32 = 12_000_000;
-
-/// The second stage of the boot loader: it makes the flash readable.
-#[unsafe(link_section = ".boot2")]
-#[used]
-static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
 
 /// The pins and peripherals of the control task.
 pub(crate) struct Hardware {
@@ -78,7 +74,7 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
     let encoders = Encoders::set_up(&device.PIO0, &device.PIO1);
     let motor = Motor::set_up(&device.PWM, guard::Guard::set_up(device.PIO1));
     let supply = Supply::set_up(device.ADC);
-    let bus = usb::bus(device.USBCTRL_REGS, device.USBCTRL_DPRAM, clocks.usb_clock, &mut resets);
+    let bus = usb::bus(clocks.usb_clock, &mut resets);
     let Some(line) = SerialLine::set_up(bus, memory) else { stop() };
     let _ = pins::was_reported();
     pins::set_status_led(true);

@@ -1,6 +1,6 @@
 //! The motor: PWM, direction and enable.
 
-use rp2040_hal::pac::PWM;
+use hal::pac::PWM;
 use upright::board::Output;
 
 use super::CLOCK_HZ;

@@ -1,6 +1,8 @@
 //! Pins: numbers, pulls and functions. docs/pico.md shows the wiring.
 
-use rp2040_hal::pac::{IO_BANK0, PADS_BANK0, RESETS, SIO};
+use hal::pac::{IO_BANK0, PADS_BANK0, RESETS, SIO};
+
+use super::chip::BLOCKS;
 
 /// Phase B of each encoder, from the cart's on; phase A is the next pin.
 pub(super) const ENCODERS: [usize; 5] = [0, 2, 4, 6, 8];
@@ -18,7 +20,8 @@ const SUPPLY: usize = 26;
 
 // Pads (2.19.6.3): input enabled, Schmitt trigger, 4 mA.
 const FLOATING: u32 = 1 << 6 | 1 << 4 | 1 << 1;
-const PULLED_DOWN: u32 = FLOATING | 1 << 2;
+/// For outputs. With the input enabled, an RP2350 would not pull a pin down that nothing drives (its erratum E9).
+const PULLED_DOWN: u32 = 1 << 4 | 1 << 2 | 1 << 1;
 const PULLED_UP: u32 = FLOATING | 1 << 3;
 /// Digital input and output off.
 const ANALOG: u32 = 1 << 7;
@@ -28,9 +31,6 @@ const FUNCTION_PWM: u32 = 4;
 const FUNCTION_SIO: u32 = 5;
 const FUNCTION_PIO1: u32 = 7;
 const NO_FUNCTION: u32 = 31;
-
-/// Bits of the blocks that this image uses, in RESETS (2.14.3): converter, pins, pads, both PIO, PWM.
-const BLOCKS: u32 = 1 << 0 | 1 << 5 | 1 << 8 | 1 << 10 | 1 << 11 | 1 << 14;
 
 /// Resets all blocks that this image uses, and gives each pin its function. Outputs are low.
 pub(super) fn set_up(resets: &RESETS, pads: &PADS_BANK0, functions: &IO_BANK0) {
@@ -58,7 +58,7 @@ pub(super) fn set_up(resets: &RESETS, pads: &PADS_BANK0, functions: &IO_BANK0) {
     set(SUPPLY, ANALOG, NO_FUNCTION);
 }
 
-fn sio() -> &'static rp2040_hal::pac::sio::RegisterBlock {
+fn sio() -> &'static hal::pac::sio::RegisterBlock {
     // SAFETY: each of these registers is written by one task only, or has bits that are set and cleared one by one.
     unsafe { &*SIO::PTR }
 }

@@ -1,6 +1,6 @@
 //! State machines of a PIO block (chapter 3).
 
-use rp2040_hal::pac::pio0::RegisterBlock;
+use hal::pac::pio0::RegisterBlock;
 
 /// Where a program begins, where it repeats from, and its last instruction.
 pub(super) struct Course {

@@ -1,6 +1,6 @@
 //! The supply of the power stage, behind a divider of 10 kΩ and 1 kΩ.
 
-use rp2040_hal::pac::ADC;
+use hal::pac::ADC;
 
 /// Volts of the supply per step of the converter, from the Pico's 3.3 V.
 const VOLTS_PER_STEP: f32 = 3.3 * 11.0 / 4096.0;

@@ -1,12 +1,14 @@
 //! The serial line: a serial port on the USB bus (CDC).
 
-use rp2040_hal::clocks::UsbClock;
-use rp2040_hal::pac::{RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
-use rp2040_hal::usb::UsbBus;
+use hal::clocks::UsbClock;
+use hal::pac::RESETS;
+use hal::usb::UsbBus;
 use upright::protocol::serial_link::MAX_MESSAGE;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
 use usbd_serial::{SerialPort, USB_CLASS_CDC};
+
+use super::chip;
 
 /// Vendor and product for serial ports of free software (pid.codes, V-USB).
 const IDENTITY: UsbVidPid = UsbVidPid(0x16c0, 0x27dd);
@@ -22,12 +24,9 @@ impl UsbMemory {
 }
 
 /// The bus of this chip.
-pub(super) fn bus(
-    registers: USBCTRL_REGS,
-    memory: USBCTRL_DPRAM,
-    clock: UsbClock,
-    resets: &mut RESETS,
-) -> UsbBusAllocator<UsbBus> {
+pub(super) fn bus(clock: UsbClock, resets: &mut RESETS) -> UsbBusAllocator<UsbBus> {
+    // SAFETY: nothing else uses them.
+    let (registers, memory) = unsafe { (chip::UsbRegisters::steal(), chip::UsbMemory::steal()) };
     // The Pico does not connect the bus's supply to the chip.
     UsbBusAllocator::new(UsbBus::new(registers, memory, clock, true, resets))
 }
@@ -45,7 +44,7 @@ impl UsbLine {
     pub(super) fn set_up(bus: UsbBusAllocator<UsbBus>, memory: &'static mut UsbMemory) -> Option<Self> {
         let bus = memory.0.insert(bus);
         let port = SerialPort::new(bus);
-        let strings = StringDescriptors::default().manufacturer("Upright").product("Upright on a Pico");
+        let strings = StringDescriptors::default().manufacturer("Upright").product(chip::PRODUCT);
         let device = UsbDeviceBuilder::new(bus, IDENTITY)
             .strings(&[strings])
             .ok()?

@@ -38,7 +38,7 @@ impl Defect {
     pub fn while_jogging(self) -> Option<Expected> {
         match self {
             Defect::HostSilent | Defect::HostWireOpen => Some(Expected::LetGo),
-            Defect::MotorDead | Defect::CartEncoderFrozen | Defect::EncoderWireOpen => {
+            Defect::MotorDead | Defect::CartEncoderFrozen | Defect::CartJammed | Defect::EncoderWireOpen => {
                 Some(Expected::Found(MotorSign::Still))
             }
             Defect::MotorReversed | Defect::EncoderReversed => Some(Expected::Found(MotorSign::Reversed)),
@@ -124,7 +124,9 @@ impl Trial {
             counter_start: self.scenario.counter_start,
             ..Scenario::at_rest(rig, self.scenario.law)
         };
-        Self { phase: Phase::Jogging, scenario, onset, watched, sensor: 0, ..self }
+        // The sensor that shows the motor's sign.
+        let sensor = usize::from(rig.actuator.acceleration.is_some());
+        Self { phase: Phase::Jogging, scenario, onset, watched, sensor, ..self }
     }
 
     /// The same defect while the rig is shaken. Ticks count from the first one with the motor on.

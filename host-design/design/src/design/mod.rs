@@ -45,4 +45,5 @@ pub use synthesis::continuous_plant;
 pub use synthesis::{Design, Feedback, Laws};
 pub(crate) use synthesis::{OBSERVER, noise_columns, wanted_poles};
 pub use thresholds::{DetectionDesign, MotorDesign, detection_thresholds};
+pub(crate) use zero_order_hold::mean_speed_hold;
 pub use zero_order_hold::{integrated_quadratic, sampled_cost, zero_order_hold};

@@ -17,7 +17,7 @@ pub fn zero_order_hold<R: Real>(a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<
 /// Bd of `x⁺ = Ad x + Bd a` for a drive whose input is the cart's acceleration a, and which moves the cart during each
 /// tick at the mean speed that a gives it, `(Ad + 1) B t/2`: even pulses are a constant speed. The cart's speed, and
 /// the links' rates with it, jump by half of `a t` at the beginning of the tick and by the other half at its end.
-pub(super) fn mean_speed_hold<R: Real>(ad: &Matrix<R>, b: &Matrix<R>, t: &R) -> Matrix<R> {
+pub(crate) fn mean_speed_hold<R: Real>(ad: &Matrix<R>, b: &Matrix<R>, t: &R) -> Matrix<R> {
     (&(ad * b) + b).scaled(&t.scale_by_power_of_two(-1))
 }
 

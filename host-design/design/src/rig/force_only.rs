@@ -6,8 +6,8 @@ use super::description::Rig;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "{rig}: `upright {command}` serves only drives that give a force; with kind = \"acceleration\" in [actuator] there \
-     are `check`, `design`, `verify`, `simulate`, `compare`, `report`, `twin`, `faults`, `false-alarms`, `export` \
-     (docs/drives.md). To see what it would say, describe the machine by kind = \"force\" and a cart of 100 times the \
+     are `check`, `design`, `verify`, `robust`, `simulate`, `compare`, `report`, `twin`, `faults`, `false-alarms`, \
+     `export` (docs/drives.md). To see what it would say, describe the machine by kind = \"force\" and a cart of 100 times the \
      links' mass, which moves as its drive says whatever the links do"
 )]
 pub struct ForceOnly {

@@ -24,9 +24,9 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let plant = chain::plant(&root, input)?;
     let states = plant.states();
     let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor.is_some());
+    let reality = given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?;
     let rig = Rig {
         name,
-        reality: given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?,
         robust: given(&robust::ROBUST)
             .map(|node| robust::robust(&node, &plant, tick.period_s))
             .transpose()?,
@@ -43,7 +43,9 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
             .transpose()?,
         limits: given(&limits::LIMITS)
             .map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant, input))?,
-        verify: scalars(&root, &verify::VERIFY)?.unwrap_or_else(Requirements::default),
+        verify: given(&verify::VERIFY)
+            .map_or(Ok(Requirements::default()), |node| verify::verify(&node, input, &reality))?,
+        reality,
         actuator,
         tick,
         swing_up: given(&swing_up::SWING_UP).map(|node| swing_up::swing_up(&node)).transpose()?,

@@ -48,13 +48,13 @@ impl Candidate {
 /// The candidates for a law that the rig asks for, the rig's own numbers first.
 pub(super) fn candidates(rig: &Rig, law: Law) -> Result<Vec<Candidate>, DesignError> {
     match (law, &rig.lqr, &rig.pole_placement) {
-        (Law::Lqr, Some(weights), _) => Ok(weighted(weights)),
+        (Law::Lqr, Some(weights), _) => Ok(weighted(weights, rig.actuator.input().weight_key())),
         (Law::PolePlacement, _, Some(poles)) => placed(rig, poles),
         _ => Ok(Vec::new()),
     }
 }
 
-fn weighted(own: &Lqr) -> Vec<Candidate> {
+fn weighted(own: &Lqr, weight_key: &str) -> Vec<Candidate> {
     let pairs = FORCE.iter().flat_map(|&force| ANGLES.iter().map(move |&angles| (force, angles)));
     let candidate = |(force, angles): (f64, f64)| {
         let mut state_weights = own.state_weights.clone();
@@ -64,7 +64,7 @@ fn weighted(own: &Lqr) -> Vec<Candidate> {
         }
         let name = match (force, angles) {
             (1.0, 1.0) => "as in the file".to_owned(),
-            _ => format!("angle weights × {angles}, force_weight × {force}"),
+            _ => format!("angle weights × {angles}, {weight_key} × {force}"),
         };
         let force_weight = rounded(force * own.force_weight, DIGITS);
         Candidate { name, numbers: LawNumbers::Weights(Lqr { state_weights, force_weight, ..own.clone() }) }

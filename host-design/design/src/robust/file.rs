@@ -36,7 +36,8 @@ pub fn rewritten(
                     ),
                 };
                 text.set("lqr.state_weights", &written)?;
-                text.set("lqr.force_weight", &significant(weights.force_weight, DIGITS))?;
+                let key = format!("lqr.{}", rig.actuator.input().weight_key());
+                text.set(&key, &significant(weights.force_weight, DIGITS))?;
             }
             LawNumbers::Poles(PolePlacement::Response { far_poles, .. }) => {
                 text.set("pole_placement.far_poles", &list(far_poles))?;
@@ -50,11 +51,11 @@ pub fn rewritten(
     if rig.verify.torque_rms_n_m.is_none() {
         text.set("verify.torque_rms_n_m", &significant(disturbance.torque_n_m, DIGITS))?;
     }
-    if rig.verify.force_rms_n.is_none() {
+    if rig.verify.force_rms_n.is_none() && rig.actuator.input().is_force() {
         text.set("verify.force_rms_n", &significant(disturbance.force_n, DIGITS))?;
     }
     set_tolerances(&mut text, tolerances)?;
-    Ok(format!("{}{text}", head(file, choice)))
+    Ok(format!("{}{text}", head(file, choice, rig.actuator.input().unit())))
 }
 
 /// Gives a rig file these tolerances as its `[robust]`; those that are 0 are left out.
@@ -66,7 +67,7 @@ pub fn set_tolerances(text: &mut RigText, tolerances: &Tolerances) -> Result<(),
     stated.try_for_each(|(key, _, value)| text.set(&format!("robust.{key}"), &significant(value, DIGITS)))
 }
 
-fn head(file: &str, choice: &Choice) -> String {
+fn head(file: &str, choice: &Choice, unit: &str) -> String {
     let mut head = format!(
         "# Written by `upright robust {file}`: that file with the weights, far poles and joint noise that survive\n\
          # its [robust] with the least ripple. The comments below are those of that file.\n\
@@ -75,7 +76,7 @@ fn head(file: &str, choice: &Choice) -> String {
     );
     for chosen in &choice.laws {
         head.push_str(&format!(
-            "#   {}: {}; predicted ripple {} N\n",
+            "#   {}: {}; predicted ripple {} {unit}\n",
             chosen.law,
             chosen.candidate.name,
             significant(chosen.ripple_n, 3)

@@ -43,7 +43,7 @@ pub struct LawRipple {
     pub law: Law,
     /// How the numbers differ from the file, in words.
     pub name: String,
-    /// Predicted rms of the force (N).
+    /// Predicted rms of the force (N), or of the acceleration (m/s²).
     pub ripple_n: f64,
 }
 

@@ -8,7 +8,7 @@ use crate::rig::{PerJoint, Rig, Tolerances};
 use crate::simulate::{FallKind, Scenario, SimulationError, run};
 use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
-use crate::verify::{CornerSettings, Disturbance, VerifyError, corners, disturbed, leaning};
+use crate::verify::{CornerSettings, Disturbance, VerifyError, corners, disturbed, leaning, waking_lean};
 
 /// Shares of the tolerances that are tried. A loop may survive with much friction and fall with little.
 pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
@@ -44,7 +44,8 @@ pub struct Runs {
     pub survived: u64,
     /// How the first of the others ended.
     pub ended_by: Option<FallKind>,
-    /// Force on the cart (N rms), over the runs that survived, after the first tenth.
+    /// Force on the cart (N rms), or its acceleration (m/s² rms) where the drive imposes that, over the runs that
+    /// survived, after the first tenth.
     pub force_rms_n: f64,
     /// Largest angle of a link from the vertical in the runs that survived (rad).
     pub peak_angle_rad: f64,
@@ -144,7 +145,7 @@ pub(super) fn one(
     seed: u64,
 ) -> Result<JudgedRun, SimulationError> {
     let scenario = Scenario {
-        start: leaning(machine, &vec![LEAN_RAD; machine.links()]),
+        start: leaning(machine, &vec![LEAN_RAD.max(waking_lean(machine)); machine.links()]),
         ..disturbed(machine, law, settings.duration_s, &settings.disturbance, seed)
     };
     let mut outcome = JudgedRun {

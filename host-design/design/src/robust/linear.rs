@@ -1,11 +1,14 @@
 //! The linear model of a candidate, in f64: ripple, and stability at every combination of mass errors.
 
-use crate::design::{Design, DesignError, Kalman, continuous_plant, integrated_quadratic, noise_columns};
+use crate::design::{
+    Design, DesignError, Kalman, continuous_plant, integrated_quadratic, mean_speed_hold, noise_columns,
+    zero_order_hold,
+};
 use crate::numerics::Matrix;
 use crate::rig::{Rig, Tolerances};
 use crate::verify::{
-    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary,
-    wrong_masses,
+    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, first_mass, radius,
+    stationary, wrong_masses,
 };
 
 /// Least distance of the spectral radius from 1: a loop closer to instability falls in a long run.
@@ -29,12 +32,14 @@ impl<'a> LinearPlants<'a> {
         tolerances: &'a Tolerances,
         disturbance: Disturbance,
     ) -> Result<Self, DesignError> {
-        let measured: Vec<usize> = rig.sensors().iter().map(|sensor| sensor.state).collect();
-        let delay_ticks = usize::from(rig.tick.delay_ticks);
         let inputs = noise_columns(rig)?;
         let period_s = rig.tick.period_s;
         let intensity = |input: usize| {
-            let rms = if input == 0 { disturbance.force_n } else { disturbance.torque_n_m };
+            let rms = match input {
+                0 if rig.actuator.input().is_force() => disturbance.force_n,
+                0 => 0.0,
+                _ => disturbance.torque_n_m,
+            };
             rms * rms * period_s
         };
         let intensities: Vec<f64> = (0..inputs.cols()).map(intensity).collect();
@@ -43,7 +48,7 @@ impl<'a> LinearPlants<'a> {
         Ok(Self {
             rig,
             tolerances,
-            nominal: PlantModel::held(&design.ad, &design.bd, delay_ticks, &measured),
+            nominal: held(rig, &design.ad, &design.bd),
             process: integrated_quadratic(&design.a.transpose(), &spread, &period_s),
             sensor_variances: rig.sensors().iter().map(square).collect(),
         })
@@ -79,17 +84,21 @@ impl<'a> LinearPlants<'a> {
     /// The plants with every combination of masses wrong by `scale` times the tolerance, and with `scale` times the
     /// tolerated latency.
     pub(super) fn corners(&self, scale: f64) -> Result<Vec<PlantModel<f64>>, DesignError> {
-        let tolerances = self.tolerances.scaled(scale);
-        let measured: Vec<usize> = self.rig.sensors().iter().map(|sensor| sensor.state).collect();
-        let period_s = self.rig.tick.period_s;
-        let delay_ticks = f64::from(self.rig.tick.delay_ticks) + tolerances.latency_s / period_s;
-        let parts = self.rig.links() + 1;
+        let (rig, tolerances) = (self.rig, self.tolerances.scaled(scale));
+        let period_s = rig.tick.period_s;
+        let delay_ticks = f64::from(rig.tick.delay_ticks) + tolerances.latency_s / period_s;
+        let first = first_mass(rig);
+        let parts = rig.links() + 1 - first;
         let corners = if tolerances.mass_percent > 0.0 { 1u32 << parts } else { 1 };
         let corner = |mask: u32| {
-            let factors: Vec<f64> =
-                (0..parts).map(|part| if mask >> part & 1 == 1 { 1.0 } else { -1.0 }).collect();
-            let plant = continuous_plant::<f64>(&wrong_masses(self.rig, tolerances.mass_percent, &factors))?;
-            Ok(PlantModel::delayed(&plant.a, &plant.b, period_s, delay_ticks, &measured))
+            let signs = (0..parts).map(|part| if mask >> part & 1 == 1 { 1.0 } else { -1.0 });
+            let factors: Vec<f64> = std::iter::repeat_n(0.0, first).chain(signs).collect();
+            let plant = continuous_plant::<f64>(&wrong_masses(rig, tolerances.mass_percent, &factors))?;
+            if rig.actuator.input().is_force() {
+                return Ok(PlantModel::delayed(&plant.a, &plant.b, period_s, delay_ticks, &measured(rig)));
+            }
+            let (ad, _) = zero_order_hold(&plant.a, &plant.b, &period_s);
+            Ok(held(rig, &ad, &mean_speed_hold(&ad, &plant.b, &period_s)))
         };
         (0..corners).map(corner).collect()
     }
@@ -110,4 +119,20 @@ impl<'a> LinearPlants<'a> {
         }
         Ok(true)
     }
+}
+
+/// State that each sensor measures.
+fn measured(rig: &Rig) -> Vec<usize> {
+    rig.sensors().iter().map(|sensor| sensor.state).collect()
+}
+
+/// The plant sampled at its tick. The cart of a drive with pulses is where the observer takes it to be: it decays
+/// within a tick, so that it does not look like two poles at 1.
+fn held(rig: &Rig, ad: &Matrix<f64>, bd: &Matrix<f64>) -> PlantModel<f64> {
+    let seen_from = if rig.actuator.input().is_force() { 0 } else { 2 };
+    let seen = |matrix: &Matrix<f64>| {
+        let entry = |row, column| if row < seen_from { 0.0 } else { matrix[(row, column)] };
+        Matrix::from_fn(matrix.rows(), matrix.cols(), entry)
+    };
+    PlantModel::held(&seen(ad), &seen(bd), usize::from(rig.tick.delay_ticks), &measured(rig))
 }

@@ -38,9 +38,9 @@ pub struct Chosen {
     pub law: Law,
     /// The chosen numbers.
     pub candidate: Candidate,
-    /// Predicted rms of the force without imperfections (N).
+    /// Predicted rms of the force (N), or of the acceleration (m/s²), without imperfections.
     pub ripple_n: f64,
-    /// Predicted rms of the force with the numbers of the file (N); none if that loop is not stable.
+    /// The same with the numbers of the file; none if that loop is not stable.
     pub own_ripple_n: Option<f64>,
     /// The runs that it survived.
     pub judgement: Judgement,

@@ -228,10 +228,11 @@ impl Bench {
 
     /// Simulates one tick of a drive that imposes the cart's motion by pulses, spread evenly. Without a motor they are
     /// a constant speed, and forces on the cart change nothing. A drive that is off lets go of a cart that its motor
-    /// moved; without a motor, the cart stands.
+    /// moved; without a motor, the cart stands. With a delay, it moves a tick after its pulses were counted.
     fn step(&mut self, drive: Drive, step_m: f64) {
-        let (_, disturbance) = self.begin(Drive::OFF);
-        let (pulses, is_on) = if let Drive::Steps(pulses) = drive { (pulses, true) } else { (0, false) };
+        let (now, disturbance) = self.begin(drive);
+        let of = |drive: Drive| if let Drive::Steps(pulses) = drive { Some(pulses) } else { None };
+        let (counted, pulses) = (of(drive).unwrap_or(0), of(now).unwrap_or(0));
         let defect = self.step_defect.take();
         let missed = match defect {
             None => 0.0,
@@ -239,9 +240,10 @@ impl Bench {
             Some(StepDefect::Off | StepDefect::Jammed) => f64::from(pulses),
             Some(StepDefect::Misses(share)) => (share * f64::from(pulses)).round(),
         };
-        let is_on = is_on && defect != Some(StepDefect::Off);
-        let (before, arrive) = (self.pulses - self.missed, f64::from(pulses) - missed);
-        self.pulses += i64::from(pulses);
+        let is_on = of(drive).is_some() && defect != Some(StepDefect::Off);
+        let on_the_way = if self.delay { i64::from(pulses) } else { 0 };
+        let (before, arrive) = (self.pulses - self.missed - on_the_way, f64::from(pulses) - missed);
+        self.pulses += i64::from(counted);
         self.missed += missed as i64;
         let speed = arrive * step_m / self.period_s;
         let Some(motor) = &self.step_motor else {

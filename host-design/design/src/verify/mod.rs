@@ -44,7 +44,7 @@ pub(crate) use corners::first_mass;
 pub(crate) use covariance::stationary;
 pub(crate) use error::chain;
 pub(crate) use loop_model::{Numbers, radius};
-pub(crate) use trial::{disturbed, leaning};
+pub(crate) use trial::{disturbed, leaning, waking_lean};
 
 pub use attraction::{
     Attraction, AttractionSettings, Edge, Map, MapAxis, Tilt, WorstTilt, attraction, attraction_map,
@@ -60,8 +60,9 @@ pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
-    Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, OfBristle, RequiredSurvival,
-    SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections, survival,
+    Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, LeftOut, OfBristle,
+    RequiredSurvival, SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections,
+    survival,
 };
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};

@@ -235,6 +235,15 @@ pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
     start
 }
 
+/// A lean of every link (rad) with which an imperfect machine starts. The links of a stepper whose joints stick would
+/// stand below one count of their encoder, because no force on the cart wakes the loop; so they lean by one.
+pub(crate) fn waking_lean(rig: &Rig) -> f64 {
+    match rig.actuator.input() {
+        CartInput::Force => 0.0,
+        CartInput::Acceleration => rig.sensors().get(1).map_or(0.0, |sensor| sensor.step()),
+    }
+}
+
 /// The largest size that survives below the first one found to fall: from `smallest` up by doubling to at most
 /// `largest`, then by bisection to within `relative` of the edge.
 ///

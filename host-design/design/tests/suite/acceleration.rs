@@ -248,6 +248,8 @@ fn keys_of_a_force_are_refused_with_what_to_do() {
     refused("[limits]\n", "[reality]\nlatency_s = 1e-4\n[limits]\n", &["reality.latency_s"]);
     refused("[limits]\n", "[robust]\ncart_friction_n = 1\n[limits]\n", &["robust.cart_friction_n"]);
     refused("[limits]\n", "[friction]\ncart_n = 1\n[limits]\n", &["friction.cart_n"]);
+    refused("[limits]\n", "[verify]\nlatency_s = 1e-4\n[limits]\n", &["verify.latency_s"]);
+    refused("[limits]\n", "[verify]\ncart_friction_n = 1\n[limits]\n", &["verify.cart_friction_n"]);
     // And the other way round.
     let force = std::fs::read_to_string(crate::published::rig_path("quadruple-paper")).unwrap();
     let other = |from: &str, to: &str| {

@@ -2,6 +2,7 @@
 
 mod acceleration;
 mod acceleration_firmware;
+mod acceleration_imperfect;
 mod acceleration_motor;
 mod design_properties;
 mod homing;

@@ -5,6 +5,7 @@ use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
 use upright_board::UNITS_PER_MICROSECOND;
 
 use super::observed::Observed;
@@ -67,8 +68,11 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
         let mut blind = setup.table.clone().without_detection();
         match setup.during {
             During::Balancing => {}
-            // Movement of the cart that is needed to determine the motor's sign.
-            During::Jog => blind.limits.sign_counts[0] = 0,
+            // Movement of the cart, or of the first link, that is needed to determine the motor's sign.
+            During::Jog => {
+                let sensor = usize::from(blind.steps.is_some());
+                blind.limits.sign_counts[sensor] = 0;
+            }
             During::Shaking(_) => blind_while_shaken(&mut blind),
         }
         without_detection = blind;
@@ -89,7 +93,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
 }
 
 /// Changes what the motor does, `since` ticks after the onset; returns whether the rig shows it by now.
-fn spoil(
+pub(super) fn spoil(
     harness: &mut Harness<'_>,
     injection: &mut Injection<'_>,
     since: usize,
@@ -379,7 +383,9 @@ impl DefectRun<'_> {
     pub(super) fn until_checked(&self, harness: &mut Harness<'_>) -> Result<(), HarnessError> {
         for tick in 0.. {
             harness.by_hand(tick)?;
-            if harness.session.status().signs == Signs::Checked {
+            // Without anything to check, the signs are known before the rig is homed.
+            let status = harness.session.status();
+            if status.signs == Signs::Checked && status.state == State::Calibrated {
                 break;
             }
         }

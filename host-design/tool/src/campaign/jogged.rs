@@ -1,12 +1,14 @@
 //! Defects in a jog.
 
+use upright::board::Output;
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
 use upright_design::defects::{Expected, Injection};
-use upright_design::harness::{Harness, HarnessError};
+use upright_design::harness::{Harness, HarnessError, Session};
 
-use super::attempt::DefectRun;
+use super::attempt::{DefectRun, spoil};
 use super::observed::Observed;
 
 /// Longest time from pressing the key until the motor is on (s).
@@ -42,27 +44,24 @@ impl DefectRun<'_> {
             if since == Some(0) {
                 injection.serial(&mut harness.session);
             }
+            let is_on = self.is_jogging(&harness.session, &output);
             tick = match tick {
                 Some(tick) => Some(tick + 1),
-                None => output.enable.then_some(0),
+                None => is_on.then_some(0),
             };
-            if is_there_before && output.enable {
-                let mut acting = output;
-                if let Some(since) = since {
-                    injection.output(since, &mut acting);
-                }
-                harness.bench.tick(acting.drive);
-                held[0] = harness.bench.state()[0];
-            } else {
-                harness.bench.hold(&held);
+            let mut acting = output;
+            if let Some(since) = since.filter(|_| is_there_before && output.enable) {
+                spoil(harness, &mut injection, since, &mut acting);
             }
+            self.move_rig(harness, &acting, &mut held, is_there_before);
             let Some(tick) = tick else {
                 if turn > self.ticks(BEGIN_S) {
                     return Err(HarnessError::NotBalancing(harness.session.status().state));
                 }
                 continue;
             };
-            observed.output(tick, output, output.enable, false);
+            let was_told = self.table.steps.is_some() && output.enable;
+            observed.output(tick, output, is_on, was_told);
             observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = harness.session.fault();
@@ -73,6 +72,24 @@ impl DefectRun<'_> {
         }
         self.after_jog(harness, &mut observed)?;
         Ok(observed)
+    }
+
+    /// A tick of the rig, which hangs as in `held`: free, or held by a hand, which does not hold a cart that goes where
+    /// its pulses say.
+    fn move_rig(&self, harness: &mut Harness<'_>, output: &Output, held: &mut [f64], is_free: bool) {
+        let is_free = is_free && output.enable;
+        if is_free || self.table.steps.is_some() {
+            harness.bench.tick(output.drive);
+            held[0] = harness.bench.state()[0];
+        }
+        if !is_free {
+            harness.bench.hold(held);
+        }
+    }
+
+    /// Whether the motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
+    fn is_jogging(&self, session: &Session<'_>, output: &Output) -> bool {
+        output.enable && (self.table.steps.is_none() || session.status().state == State::Jogging)
     }
 
     /// Checks the signs by hand, and lets the links hang still, wherever the cart is; returns that state.

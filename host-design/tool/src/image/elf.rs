@@ -51,18 +51,25 @@ pub(crate) enum ImageChip {
     F4,
     /// Code and constants are copied into RAM.
     Rp2040,
+    /// The same, on a processor as the first one's.
+    Rp2350,
 }
 
 impl ImageChip {
-    /// Each of its images has a second stage of the boot loader, no other image does.
+    /// Only an RP2040's image has a second stage of the boot loader, only an RP2350's says what it is.
     fn of(elf: &ElfFile32) -> Self {
-        if elf.section_by_name(".boot2").is_some() { Self::Rp2040 } else { Self::F4 }
+        let has = |name| elf.section_by_name(name).is_some_and(|section| section.size() > 0);
+        match (has(".boot2"), has(".start_block")) {
+            (true, _) => Self::Rp2040,
+            (false, true) => Self::Rp2350,
+            (false, false) => Self::F4,
+        }
     }
 
     fn flash(self) -> std::ops::Range<u64> {
         match self {
             Self::F4 => 0x0800_0000..0x1000_0000,
-            Self::Rp2040 => 0x1000_0000..0x1020_0000,
+            Self::Rp2040 | Self::Rp2350 => 0x1000_0000..0x1020_0000,
         }
     }
 
@@ -70,7 +77,7 @@ impl ImageChip {
     /// Architecture Reference Manual, B1.5.6), and 18 of the floating-point unit (Armv7-M, B1.5.7).
     pub(crate) fn exception_frame(self) -> u32 {
         match self {
-            Self::F4 => 108,
+            Self::F4 | Self::Rp2350 => 108,
             Self::Rp2040 => 36,
         }
     }

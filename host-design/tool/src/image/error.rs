@@ -44,7 +44,7 @@ pub enum BuildError {
         /// The rig's tick (s).
         tick_s: f64,
     },
-    /// A Pico cannot run the rig.
+    /// A Pico or Pico 2 cannot run the rig.
     #[error(transparent)]
     Pico(#[from] PicoError),
     /// The image cannot be read.

@@ -1,6 +1,7 @@
 //! The boards as a list of facts.
 
 use super::board::BoardName;
+use super::pico_board::PicoBoard;
 use super::pico_limits::{PICO_ENCODERS, PICO_TICK_S};
 
 /// A board that there is an image for.
@@ -33,15 +34,15 @@ pub fn board_facts() -> Vec<BoardFacts> {
         tick_s: board.tick_s(),
         executed: vec!["virtual board", REAL],
     });
-    let pico = BoardFacts {
-        name: "pico",
-        product: "Raspberry Pi Pico",
-        chip: "RP2040",
+    let pico = PicoBoard::ALL.map(|board| BoardFacts {
+        name: board.name(),
+        product: board.product(),
+        chip: board.chip(),
         encoders: PICO_ENCODERS,
         tick_s: PICO_TICK_S,
-        executed: vec!["rp2040js 1.4.1", REAL],
-    };
-    f4.into_iter().chain([pico]).collect()
+        executed: vec![board.executed(), REAL],
+    });
+    f4.into_iter().chain(pico).collect()
 }
 
 #[cfg(test)]

@@ -24,15 +24,16 @@ pub fn forbidden_functions(image: &LinkedImage) -> Vec<&str> {
     names.filter(|name| is_forbidden(name)).collect()
 }
 
-/// Those of [`forbidden_functions`] that must not be in this image: all, or on a Pico those that an interrupt reaches.
-/// There, the crates of the USB device contain panics. They run below the tick, and a panic turns the motor off.
+/// Those of [`forbidden_functions`] that must not be in this image: all, or on a Pico and a Pico 2 those that an
+/// interrupt reaches. There, the crates of the USB device contain panics. They run below the tick, and a panic turns
+/// the motor off.
 ///
 /// # Errors
 /// [`StackError`] if it is unknown what an interrupt reaches.
 pub fn wrong_functions(image: &LinkedImage) -> Result<Vec<&str>, StackError> {
     Ok(match image.chip {
         ImageChip::F4 => forbidden_functions(image),
-        ImageChip::Rp2040 => forbidden_in_handlers(image)?,
+        ImageChip::Rp2040 | ImageChip::Rp2350 => forbidden_in_handlers(image)?,
     })
 }
 

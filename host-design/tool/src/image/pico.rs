@@ -1,4 +1,4 @@
-//! The image for a Raspberry Pi Pico, which is a crate of its own: `boards/rp2040/`.
+//! The images for a Raspberry Pi Pico and a Pico 2, which are a crate of their own: `boards/rp2040/`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,29 +8,29 @@ use upright_design::table::{TableValues, gains_source, write_atomically};
 use super::build::{PROFILE, images, one_at_a_time};
 use super::compiler::{Compiler, compiler_for_chips};
 use super::error::BuildError;
+use super::pico_board::PicoBoard;
 use super::pico_limits::check;
 use super::uf2::uf2;
 use crate::project::checkout;
 
-/// The target of the RP2040: Cortex-M0+.
-const TARGET: &str = "thumbv6m-none-eabi";
 /// The files of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PicoImage {
     /// For a debugger.
     pub elf: PathBuf,
-    /// For the drive that a Pico shows while BOOTSEL is held.
+    /// For the drive that the board shows while BOOTSEL is held.
     pub uf2: PathBuf,
 }
 
-/// Builds the image with the table of `rig`.
+/// Builds the image for this board with the table of `rig`.
 ///
 /// # Errors
-/// [`BuildError`] if a Pico cannot run this rig, there is no compiler, or it fails.
-pub fn build_pico(rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildError> {
-    check(table.sensors(), rig.tick.period_s, table.swing_up.is_some())?;
+/// [`BuildError`] if the board cannot run this rig, there is no compiler, or it fails.
+pub fn build_pico(board: PicoBoard, rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildError> {
+    check(board, table.sensors(), rig.tick.period_s, table.swing_up.is_some())?;
     let name = format!(
-        "pico-{:016x}-{:08x}-{:08x}",
+        "{}-{:016x}-{:08x}-{:08x}",
+        board.name(),
         rig.hash(),
         table.crc(),
         table.swing_up_crc().unwrap_or_default()
@@ -42,23 +42,23 @@ pub fn build_pico(rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildErro
         write_atomically(&gains, source.as_bytes())?;
     }
     let _others_wait = one_at_a_time()?;
-    let bytes = compiled(&gains)?;
+    let bytes = compiled(board.target(), &gains)?;
     let image =
         PicoImage { elf: images()?.join(format!("{name}.elf")), uf2: images()?.join(format!("{name}.uf2")) };
     write_atomically(&image.elf, &bytes)?;
-    write_atomically(&image.uf2, &uf2(&image.elf, &bytes)?)?;
+    write_atomically(&image.uf2, &uf2(board.family(), &image.elf, &bytes)?)?;
     Ok(image)
 }
 
 /// Compiles the image; returns the ELF file.
-fn compiled(gains: &Path) -> Result<Vec<u8>, BuildError> {
-    let Compiler { program, mut cargo, target_directory, .. } = compiler_for_chips(&[TARGET])?;
+fn compiled(target: &str, gains: &Path) -> Result<Vec<u8>, BuildError> {
+    let Compiler { program, mut cargo, target_directory, .. } = compiler_for_chips(&[target])?;
     cargo.current_dir(checkout()?.join("boards/rp2040")).env("UPRIGHT_GAINS", gains);
-    cargo.args(["build", "--quiet", "--profile", PROFILE, "--locked", "--target", TARGET]);
+    cargo.args(["build", "--quiet", "--profile", PROFILE, "--locked", "--target", target]);
     let output = cargo.output().map_err(|source| BuildError::Start(program, source))?;
     if !output.status.success() {
         return Err(BuildError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
-    let path = target_directory.join(TARGET).join(PROFILE).join("upright-rp2040");
+    let path = target_directory.join(target).join(PROFILE).join("upright-rp2040");
     std::fs::read(&path).map_err(|source| BuildError::File { path, source })
 }

@@ -1,8 +1,10 @@
-//! What a Raspberry Pi Pico can do.
+//! What a Raspberry Pi Pico and a Pico 2 can do.
 
-/// Processor clock (Hz).
+use super::pico_board::PicoBoard;
+
+/// Processor clock of a Pico (Hz).
 const CLOCK_HZ: f64 = 125e6;
-/// Encoders that it counts.
+/// Encoders that both count.
 pub const PICO_ENCODERS: usize = 5;
 /// Shortest and longest tick (s).
 pub const PICO_TICK_S: [f64; 2] = [0.000_5, 0.1];
@@ -14,18 +16,31 @@ pub const PICO_MOTION_CYCLES: [u32; 4] = [57_000, 94_000, 137_000, 188_000];
 /// Largest share of a period that a tick may take (%).
 const MOST_PERCENT: f64 = 75.0;
 
-/// Why a Pico cannot run a rig.
+/// Why one of the boards cannot run a rig.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum PicoError {
     /// Too many encoders.
     #[error(
-        "pico counts {PICO_ENCODERS} encoders, and this rig has {0}: use another board (`upright firmware boards`)"
+        "{} counts {PICO_ENCODERS} encoders, and this rig has {needed}: use another board (`upright firmware boards`)",
+        board.name()
     )]
-    Encoders(usize),
+    Encoders {
+        /// Which board.
+        board: PicoBoard,
+        /// Number of the rig's sensors.
+        needed: usize,
+    },
     /// A tick that it cannot make.
-    #[error("pico makes ticks of 0.5 to 100 ms, and this rig's is {} ms: change tick.period_s", .0 * 1e3)]
-    Tick(f64),
-    /// A tick that takes too long.
+    #[error(
+        "{} makes ticks of 0.5 to 100 ms, and this rig's is {} ms: change tick.period_s", board.name(), tick_s * 1e3
+    )]
+    Tick {
+        /// Which board.
+        board: PicoBoard,
+        /// The rig's tick (s).
+        tick_s: f64,
+    },
+    /// A tick that takes a Pico too long.
     #[error(
         "a tick {what} takes up to {cycles} cycles on a pico, {:.2} ms at 125 MHz: {:.0} % of this rig's {} ms, and {MOST_PERCENT} % \
          is the most: {remedy}",
@@ -43,13 +58,23 @@ pub enum PicoError {
     },
 }
 
-/// Checks what a Pico can do before the compiler is started.
-pub(super) fn check(sensors: usize, tick_s: f64, has_motions: bool) -> Result<(), PicoError> {
+/// Checks what the board can do before the compiler is started.
+pub(super) fn check(
+    board: PicoBoard,
+    sensors: usize,
+    tick_s: f64,
+    has_motions: bool,
+) -> Result<(), PicoError> {
     if sensors > PICO_ENCODERS {
-        return Err(PicoError::Encoders(sensors));
+        return Err(PicoError::Encoders { board, needed: sensors });
     }
     if !(PICO_TICK_S[0] * (1.0 - 1e-6)..=PICO_TICK_S[1] * (1.0 + 1e-6)).contains(&tick_s) {
-        return Err(PicoError::Tick(tick_s));
+        return Err(PicoError::Tick { board, tick_s });
+    }
+    // With a floating-point unit, the longest tick has 7,700 instructions (docs/results/chips.md), the shortest period
+    // 75,000 cycles.
+    if board == PicoBoard::Pico2 {
+        return Ok(());
     }
     let links = sensors.saturating_sub(2).min(PICO_BALANCING_CYCLES.len() - 1);
     let fits = |cycles: u32| f64::from(cycles) <= CLOCK_HZ * tick_s * MOST_PERCENT / 1e2;
@@ -71,14 +96,19 @@ mod tests {
 
     #[test]
     fn what_a_pico_cannot_do_is_refused_with_the_numbers() {
-        assert_eq!(check(5, 1e-3, false), Ok(()));
-        assert_eq!(check(2, 2e-3, true), Ok(()));
-        let refused = |sensors, tick_s, motions| check(sensors, tick_s, motions).unwrap_err().to_string();
+        assert_eq!(check(PicoBoard::Pico, 5, 1e-3, false), Ok(()));
+        assert_eq!(check(PicoBoard::Pico, 2, 2e-3, true), Ok(()));
+        let refused = |sensors, tick_s, motions| {
+            check(PicoBoard::Pico, sensors, tick_s, motions).unwrap_err().to_string()
+        };
         assert!(refused(6, 1e-3, false).contains("counts 5 encoders"));
         assert!(refused(2, 2e-4, false).contains("0.5 to 100 ms"));
         let four_links = refused(5, 1e-3, true);
         assert!(four_links.contains("188000 cycles") && four_links.contains("150 %"), "{four_links}");
         assert!(four_links.contains("--no-motions"), "{four_links}");
         assert!(refused(5, 6e-4, false).contains("that balances"));
+        assert_eq!(check(PicoBoard::Pico2, 5, 1e-3, true), Ok(()));
+        let too_many = check(PicoBoard::Pico2, 6, 1e-3, false).unwrap_err().to_string();
+        assert!(too_many.starts_with("pico2 counts 5 encoders"), "{too_many}");
     }
 }

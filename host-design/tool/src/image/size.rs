@@ -118,7 +118,7 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
         image.sections.iter().filter(|section| is_copied(section)).map(|section| section.bytes).sum();
     let code_limit = match image.chip {
         ImageChip::F4 => CODE_LIMIT,
-        ImageChip::Rp2040 => PICO_CODE_LIMIT,
+        ImageChip::Rp2040 | ImageChip::Rp2350 => PICO_CODE_LIMIT,
     };
     Ok(Size { flash, constants, ram, table, copied, code_limit, sections, crates })
 }

@@ -165,6 +165,12 @@ fn node(image: &LinkedImage, index: usize) -> Result<FunctionFrame, StackError> 
             }
             // A branch table: its branches are decoded as well.
             Effect::JumpTo(register) if is_in_a_table(&before(&effects, place), register) => {}
+            // What the linker puts between code that is far apart: on a Cortex-M33, the address is in two instructions.
+            Effect::Indirect | Effect::JumpTo(_) if name.contains("LongThunk_") => {
+                let target =
+                    image.code(&image.functions[index]).first().and_then(|code| moved(&code.halfwords));
+                node.calls.push(index_of(image, &name, target.unwrap_or_default() & !1)?);
+            }
             Effect::Indirect | Effect::JumpTo(_) => {
                 return Err(StackError::Indirect { function: name, address });
             }
@@ -176,7 +182,7 @@ fn node(image: &LinkedImage, index: usize) -> Result<FunctionFrame, StackError> 
                 let growth = growth_by(image, &effects, place, register);
                 node.frame += growth.ok_or(StackError::Variable { function: name.clone(), address })?;
             }
-            // What the linker puts between code that is far apart.
+            // On a Cortex-M0, it is in a word behind them.
             Effect::Literal(_, at) if name.contains("LongThunk_") => {
                 let target = image.word_in_code(at).unwrap_or_default() & !1;
                 node.calls.push(index_of(image, &name, target)?);
@@ -193,6 +199,16 @@ fn node(image: &LinkedImage, index: usize) -> Result<FunctionFrame, StackError> 
     node.calls.sort_unstable();
     node.calls.dedup();
     Ok(node)
+}
+
+/// The address that the first two instructions move into a register: `movw` and `movt`.
+fn moved(halfwords: &[u16]) -> Option<u32> {
+    let &[low, below_low, high, below_high, ..] = halfwords else { return None };
+    let half = |first: u16, second: u16| {
+        let parts = [(first & 15) << 12, (first >> 10 & 1) << 11, (second >> 12 & 7) << 8, second & 255];
+        u32::from(parts[0] | parts[1] | parts[2] | parts[3])
+    };
+    Some(half(high, below_high) << 16 | half(low, below_low))
 }
 
 /// Up to five instructions before one.
@@ -277,7 +293,7 @@ fn deepest(nodes: &[FunctionFrame], from: usize) -> Result<(u32, Vec<String>), S
 
 #[cfg(test)]
 mod tests {
-    use super::{FunctionFrame, StackError, deepest};
+    use super::{FunctionFrame, StackError, deepest, moved};
 
     fn node(name: &str, frame: u32, calls: &[usize]) -> FunctionFrame {
         FunctionFrame { name: name.to_owned(), frame, calls: calls.to_vec() }
@@ -287,6 +303,13 @@ mod tests {
     fn the_deepest_chain_counts_and_not_the_longest() {
         let nodes = [node("a", 8, &[1, 3]), node("b", 4, &[2]), node("c", 4, &[]), node("d", 100, &[])];
         assert_eq!(deepest(&nodes, 0).unwrap(), (108, vec!["a".to_owned(), "d".to_owned()]));
+    }
+
+    #[test]
+    fn the_address_in_two_instructions_is_read() {
+        // movw ip, #0xe129; movt ip, #0x2000; bx ip
+        assert_eq!(moved(&[0xf24e, 0x1c29, 0xf2c2, 0x0c00, 0x4760]), Some(0x2000_e129));
+        assert_eq!(moved(&[0xf24e, 0x1c29]), None);
     }
 
     #[test]

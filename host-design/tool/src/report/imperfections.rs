@@ -2,7 +2,9 @@
 
 use super::ReportSource;
 use crate::figure::{Axis, Curve, Figure, Panel};
-use upright_design::verify::{CornerSettings, Imperfections, Survival, VerifyError, corners, limit_cycle};
+use upright_design::verify::{
+    CornerSettings, Imperfections, LeftOut, Survival, VerifyError, corners, limit_cycle,
+};
 
 /// Errors of the masses for which every combination is run (%).
 const PERCENTS: [f64; 9] = [2.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0];
@@ -15,6 +17,7 @@ const MOST_LINKS: usize = 5;
 pub(super) struct SurvivalTable {
     pub(super) law: &'static str,
     pub(super) rows: Vec<SurvivalRow>,
+    pub(super) left_out: Vec<LeftOut>,
     pub(super) together: Option<String>,
 }
 
@@ -33,7 +36,12 @@ pub(super) struct SurvivalRow {
 impl SurvivalTable {
     pub(super) fn of(found: &Imperfections) -> Self {
         let together = found.together.map(|all| all.text(found.settings.seeds));
-        Self { law: found.law.title(), rows: found.alone.iter().map(SurvivalRow::of).collect(), together }
+        Self {
+            law: found.law.title(),
+            rows: found.alone.iter().map(SurvivalRow::of).collect(),
+            left_out: found.left_out.clone(),
+            together,
+        }
     }
 }
 

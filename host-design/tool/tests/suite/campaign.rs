@@ -89,7 +89,7 @@ fn while_jogging(table: &TableValues, place: RunPlace<'_>) -> Vec<Defect> {
 
 #[test]
 fn every_defect_of_a_jog_is_found_and_nothing_else() {
-    for name in ["quadruple-paper", "single-quanser-ip02"] {
+    for name in ["quadruple-paper", "single-quanser-ip02", "single-stepper", "quadruple-stepper"] {
         let (rig, table) = rig_and_table(name);
         let kinds = while_jogging(table, RunPlace::Host);
         let setup = Setup { during: During::Jog, ..on_host(rig, table) };

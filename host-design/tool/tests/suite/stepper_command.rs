@@ -52,19 +52,12 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
             format!("single-stepper: `upright {}` serves only drives that give a force", arguments[0]);
         assert!(stderr(&output).contains(&words), "{arguments:?}: {}", stderr(&output));
     };
-    for command in ["robust", "swing-up", "transitions"] {
+    for command in ["swing-up", "transitions"] {
         refused(&[command, &rig]);
     }
     refused(&["commission", &rig, "--target", "host"]);
     refused(&["identify", &rig, "nothing.log"]);
-    for (command, option) in [
-        ("twin", "--target"),
-        ("faults", "--target"),
-        ("faults", "--jog"),
-        ("faults", "--shake"),
-        ("verify", "--imperfections"),
-        ("report", "--imperfections"),
-    ] {
+    for (command, option) in [("twin", "--target"), ("faults", "--target"), ("faults", "--shake")] {
         let target = if option == "--target" { &["qemu"][..] } else { &[] };
         let output = upright(&[&[command, &rig, option], target].concat());
         assert_eq!(status(&output), 2, "{}", stderr(&output));
@@ -110,13 +103,28 @@ fn verify_tells_how_slow_a_stepper_may_be_and_which_force_it_needs() {
 }
 
 #[test]
+fn verify_tells_which_imperfection_makes_a_stepper_fall_and_why_others_are_left_out() {
+    let found = upright(&["verify", &stepper(), "--imperfections"]);
+    assert_eq!(status(&found), 0, "{}", stderr(&found));
+    let row = |key: &str| {
+        stdout(&found).lines().find(|line| line.trim_start().starts_with(key)).unwrap().to_owned()
+    };
+    assert!(row("homing_error_rad").contains("fault "), "{}", stdout(&found));
+    assert!(stdout(&found).contains("with 100 times kalman.acceleration_noise_m2_per_s3: motor off"));
+    assert!(row("cart_friction_n").contains("changes nothing before the motor slips"));
+    assert!(row("latency_s").contains("`delay margin`"));
+}
+
+#[test]
 fn the_report_of_a_stepper_shows_its_acceleration() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("report.html");
-    let made = upright(&["report", &stepper(), "--out", out.to_str().unwrap(), "--runs", "20"]);
+    let options = ["--out", out.to_str().unwrap(), "--runs", "20", "--imperfections"];
+    let made = upright(&[&["report", &stepper()][..], &options].concat());
     assert_eq!(status(&made), 0, "{}", stderr(&made));
     let page = std::fs::read_to_string(&out).unwrap();
     assert!(page.contains("acceleration u (m/s²)") && page.contains("largest acceleration"));
+    assert!(page.contains("<code>force_percent</code> a stepper has no force constant"));
     assert!(!page.contains("force u (N)") && !page.contains("largest force"));
 }
 
@@ -142,10 +150,29 @@ fn a_stepper_moves_on_a_page() {
 }
 
 #[test]
+fn robust_serves_a_stepper_and_refuses_tolerances_that_it_does_not_have() {
+    let robust = |options: &[&str]| {
+        upright(&[&["robust", &stepper(), "--mass", "5", "--duration", "5", "--runs", "1"], options].concat())
+    };
+    let chosen = robust(&["--joint-friction", "1e-3"]);
+    assert_eq!(status(&chosen), 0, "{}", stderr(&chosen));
+    for words in ["acceleration_weight", "m/s² rms", " m/s² (as in the file: "] {
+        assert!(stdout(&chosen).contains(words), "{words}: {}", stdout(&chosen));
+    }
+    for option in ["--latency", "--cart-friction"] {
+        let refused = robust(&[option, "1e-3"]);
+        assert_eq!(status(&refused), 2, "{}", stdout(&refused));
+        assert!(stderr(&refused).contains(option), "{}", stderr(&refused));
+    }
+}
+
+#[test]
 fn a_defect_of_a_stepper_is_found_and_one_that_it_cannot_have_is_refused() {
     let jammed = upright(&["faults", &stepper(), "--kind", "cart-jammed", "--runs", "3"]);
     assert_eq!(status(&jammed), 0, "{}{}", stdout(&jammed), stderr(&jammed));
     assert!(stdout(&jammed).contains("without detection"), "{}", stdout(&jammed));
+    let jogged = upright(&["faults", &stepper(), "--jog", "--runs", "16"]);
+    assert_eq!(status(&jogged), 0, "{}{}", stdout(&jogged), stderr(&jogged));
     let stuck = upright(&["faults", &stepper(), "--kind", "motor-stuck", "--runs", "3"]);
     assert_eq!(status(&stuck), 2, "{}", stdout(&stuck));
 }

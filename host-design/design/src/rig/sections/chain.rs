@@ -80,6 +80,16 @@ impl CartInput {
     pub fn is_force(&self) -> bool {
         *self == CartInput::Force
     }
+
+    /// Its unit.
+    pub fn unit(&self) -> &'static str {
+        if self.is_force() { "N" } else { "m/s²" }
+    }
+
+    /// The key of its weight in `[lqr]`.
+    pub fn weight_key(&self) -> &'static str {
+        if self.is_force() { "force_weight" } else { "acceleration_weight" }
+    }
 }
 
 impl Table<'_> {
@@ -106,7 +116,7 @@ impl Table<'_> {
         match keys.iter().find_map(|key| self.get(key)) {
             Some(node) => Err(node.out_of_range(
                 "only with kind = \"force\" in [actuator]",
-                "leave it out: a drive that imposes the cart's acceleration is not affected",
+                "leave it out: of a drive that imposes the cart's acceleration, it changes nothing that is simulated",
             )),
             None => Ok(()),
         }

@@ -1,8 +1,12 @@
 //! `[verify]`: what `upright verify` requires of the loop.
 
+use super::super::error::RigError;
 use super::super::key::{Absent, Section};
+use super::super::node::Node;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
+use super::chain::CartInput;
+use super::reality::Reality;
 
 /// `[verify]`
 pub(crate) static VERIFY: Section = Section {
@@ -71,6 +75,20 @@ keys! {
             "spread (±) of all masses, lengths and inertias that the loop has to survive as the only imperfection",
             NOT_REQUIRED;
     }
+}
+
+/// Reads `[verify]`; imperfections that are not simulated with a drive with pulses cannot be required.
+pub(crate) fn verify(node: &Node<'_>, input: CartInput, reality: &Reality) -> Result<Requirements, RigError> {
+    let table = node.table(&VERIFY)?;
+    if input == CartInput::Acceleration {
+        let of_force =
+            ["backlash_m", "belt_compliance_m_per_n", "driver_lag_s", "latency_s", "force_percent"];
+        table.refuse_for_acceleration(&of_force)?;
+        if reality.step_motor.holding_force_n.is_none() {
+            table.refuse_for_acceleration(&["cart_friction_n"])?;
+        }
+    }
+    Requirements::read(&table)
 }
 
 impl Default for Requirements {

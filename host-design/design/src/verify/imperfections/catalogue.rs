@@ -35,7 +35,8 @@ impl Imperfection {
 
     /// The same with this angle over which joint friction builds up (rad), or the default.
     pub(super) fn on_with(&self, rig: &Rig, size: f64, bristle_rad: Option<f64>) -> Rig {
-        let mut reality = Reality::default();
+        // The motor behind the pulses is a part of the drive.
+        let mut reality = Reality { step_motor: rig.reality.step_motor.clone(), ..Reality::default() };
         if let Some(bristle_rad) = bristle_rad {
             reality.friction.presliding_rad = PerJoint::all(bristle_rad);
         }
@@ -51,6 +52,33 @@ impl Imperfection {
     /// One machine for each of these angles.
     pub(super) fn on_each(&self, rig: &Rig, size: f64) -> Vec<Rig> {
         self.bristles_rad().into_iter().map(|bristle_rad| self.on_with(rig, size, bristle_rad)).collect()
+    }
+
+    /// Those that are simulated on the machine of `rig`.
+    pub fn all_of(rig: &Rig) -> Vec<&'static Self> {
+        IMPERFECTIONS.iter().filter(|one| one.not_on(rig).is_none()).collect()
+    }
+
+    /// Why this imperfection is not simulated on the machine of `rig`, if it is not.
+    pub fn not_on(&self, rig: &Rig) -> Option<&'static str> {
+        rig.actuator.acceleration.as_ref()?;
+        match self.key {
+            "cart_friction_n" if rig.reality.step_motor.holding_force_n.is_some() => None,
+            "cart_friction_n" => Some(
+                "changes nothing before the motor slips; give holding_force_n in [reality] to see from which size it does",
+            ),
+            "backlash_m" | "belt_compliance_m_per_n" => {
+                Some("is not simulated between a stepper and its cart")
+            }
+            "driver_lag_s" => {
+                Some("is not simulated with a stepper; see `least bandwidth` of `upright verify`")
+            }
+            "latency_s" => {
+                Some("is not simulated with a stepper; see `delay margin` of `upright verify`, and --late")
+            }
+            "force_percent" => Some("a stepper has no force constant; see `gain margin` of `upright verify`"),
+            _ => None,
+        }
     }
 
     /// The typical sizes as text: `1e-4 to 0.001`.

@@ -5,13 +5,10 @@ use upright::table::Law;
 use super::catalogue::Imperfection;
 use crate::design::Uncertified;
 use crate::number::{rounded, significant};
-use crate::rig::{Rig, Tolerances};
+use crate::rig::{CartInput, Rig, Tolerances};
 use crate::table::TableValues;
 use crate::verify::VerifyError;
 
-/// Every change that is tried, in words.
-pub(super) const TRIED: &str = "its tolerance in [robust], robust.cart_friction_n, robust.homing_error_rad, 100 times \
-                                kalman.force_noise_n2_s, 10 times kalman.joint_noise";
 /// Friction of the cart, as a share of the largest force, for what acts like an unknown force.
 const FORCE_SHARE: f64 = 0.05;
 /// Wrong zeros (rad) for what acts like them.
@@ -32,9 +29,14 @@ impl<'a> Cures<'a> {
         let friction_n = rounded(FORCE_SHARE * rig.force_limit_n().unwrap_or_default(), 2);
         cures.of_all = [("cart_friction_n", friction_n), ("homing_error_rad", ZERO_RAD)]
             .into_iter()
+            .filter(|(_, size)| *size > 0.0)
             .filter_map(|(key, size)| cures.tolerating(key, size))
             .collect();
-        for (name, factors) in [("force_noise_n2_s", [100.0, 1.0]), ("joint_noise", [1.0, 10.0])] {
+        let input = match rig.actuator.input() {
+            CartInput::Force => "force_noise_n2_s",
+            CartInput::Acceleration => "acceleration_noise_m2_per_s3",
+        };
+        for (name, factors) in [(input, [100.0, 1.0]), ("joint_noise", [1.0, 10.0])] {
             cures.of_all.extend(cures.noisier(law, name, factors));
         }
         Ok(cures)
@@ -59,7 +61,7 @@ impl<'a> Cures<'a> {
         *match key {
             "mass_percent" => mass_percent,
             "joint_friction_n_m" => joint_friction_n_m,
-            "cart_friction_n" => cart_friction_n,
+            "cart_friction_n" if self.rig.actuator.input() == CartInput::Force => cart_friction_n,
             "homing_error_rad" => homing_error_rad,
             _ => return None,
         } = size;
@@ -69,12 +71,16 @@ impl<'a> Cures<'a> {
         Some((format!("robust.{key} = {}", significant(size, 2)), table))
     }
 
-    /// `[kalman]` with more noise of force and joints, by these factors, which changes the observer, too.
+    /// `[kalman]` with more noise of the cart's input and of the joints, by these factors, which changes the observer,
+    /// too; none if that noise is 0.
     fn noisier(&self, law: Law, name: &str, [force, joints]: [f64; 2]) -> Option<(String, TableValues)> {
         let mut rig = self.rig.with_law_alone(law);
         let kalman = rig.kalman.as_mut()?;
         kalman.force_noise_n2_s *= force;
         kalman.joint_noise.iter_mut().for_each(|noise| *noise *= joints);
+        if rig.kalman == self.rig.kalman {
+            return None;
+        }
         let design = Uncertified::sampled_alone(&rig).ok()?;
         let changed = TableValues::of_uncertified(&rig, &design).ok()?;
         let mut table = self.table.clone();

@@ -20,7 +20,7 @@ use search::SizeSearch;
 pub(super) use search::first;
 
 pub use survival::{
-    Cure, ImperfectionSettings, Imperfections, OfBristle, RequiredSurvival, SizeRuns, Survival,
+    Cure, ImperfectionSettings, Imperfections, LeftOut, OfBristle, RequiredSurvival, SizeRuns, Survival,
 };
 
 /// Sizes at which a limit cycle is shown, as shares of the one at which the loop falls.
@@ -47,10 +47,10 @@ pub fn imperfections(
         done();
         survival
     };
-    let mut alone: Vec<Survival> = parallel::try_map(&IMPERFECTIONS, one)?;
+    let mut alone: Vec<Survival> = parallel::try_map(Imperfection::all_of(rig), one)?;
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
     let together = (rig.reality != Reality::default()).then(|| search.verdict(rig)).transpose()?;
-    Ok(Imperfections { law, settings: *settings, alone, together })
+    Ok(Imperfections { law, settings: *settings, alone, left_out: LeftOut::of(rig), together })
 }
 
 /// Searches for the sizes of one imperfection alone, and for no cure.

@@ -10,7 +10,7 @@ use crate::parallel;
 use crate::rig::Rig;
 use crate::simulate::{FallKind, Scenario, SimulationError};
 use crate::table::TableValues;
-use crate::verify::trial::{Horizon, Outcome, disturbed, trial};
+use crate::verify::trial::{Horizon, Outcome, disturbed, leaning, trial, waking_lean};
 
 /// Sizes are tried from this share of a good machine's to this multiple of a poor one's.
 const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
@@ -54,6 +54,7 @@ impl SizeSearch<'_> {
             turned_off_at: turned_off_at.map(|(size, _)| size),
             ended_by: turned_off_at.map(|(_, kind)| kind),
             cure: turned_off_at.map_or(Ok(None), |(size, _)| self.cure(imperfection, size, changed))?,
+            tried: changed.iter().map(|(change, _)| change.clone()).collect(),
             bristles: of_bristles
                 .into_iter()
                 .filter_map(|(bristle_rad, falls_at, turned_off_at)| {
@@ -134,8 +135,11 @@ impl SizeSearch<'_> {
 
     fn run(&self, real: &Rig, seed: u64, is_supervised: bool) -> Result<Outcome, SimulationError> {
         let ImperfectionSettings { duration_s, disturbance, .. } = self.settings;
-        let scenario =
-            Scenario { is_supervised, ..disturbed(real, self.law, *duration_s, disturbance, seed) };
+        let scenario = Scenario {
+            is_supervised,
+            start: leaning(real, &vec![waking_lean(real); real.links()]),
+            ..disturbed(real, self.law, *duration_s, disturbance, seed)
+        };
         trial(real, self.table, &scenario, &Horizon::default())
     }
 

@@ -3,8 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::catalogue::Imperfection;
-use super::cure::TRIED;
+use super::catalogue::{IMPERFECTIONS, Imperfection};
 use crate::number::significant;
 use crate::rig::Rig;
 use crate::simulate::FallKind;
@@ -59,6 +58,9 @@ pub struct Survival {
     pub ended_by: Option<FallKind>,
     /// The best change of the rig file that was tried; none if none of them helps.
     pub cure: Option<Cure>,
+    /// Every change that was tried.
+    #[serde(skip)]
+    pub tried: Vec<String>,
     /// For joint friction, the sizes for each of the bristle lengths; the sizes above are the smaller ones.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bristles: Vec<OfBristle>,
@@ -100,8 +102,10 @@ impl Survival {
             (Some(Cure { change, turned_off_at }), _) => {
                 Some(format!("with {change}: motor off {}", significant(*turned_off_at, 2)))
             }
-            (None, Some(_)) => Some(format!("no cure found; tried: {}", TRIED)),
-            (None, None) => None,
+            (None, Some(_)) if !self.tried.is_empty() => {
+                Some(format!("no cure found; tried: {}", self.tried.join(", ")))
+            }
+            (None, _) => None,
         };
         self.bristles.iter().map(of_bristle).chain(cure).collect()
     }
@@ -135,8 +139,28 @@ pub struct Imperfections {
     pub settings: ImperfectionSettings,
     /// Each imperfection alone.
     pub alone: Vec<Survival>,
+    /// Those that are not simulated on this machine.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
     /// All imperfections of the rig file's `[reality]` together; none if it has none.
     pub together: Option<SizeRuns>,
+}
+
+/// An imperfection that is not simulated on a machine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// Its key.
+    pub key: &'static str,
+    /// Why it is left out.
+    pub reason: &'static str,
+}
+
+impl LeftOut {
+    /// Those of a rig.
+    pub(super) fn of(rig: &Rig) -> Vec<Self> {
+        let reason = |one: &Imperfection| Some(Self { key: one.key, reason: one.not_on(rig)? });
+        IMPERFECTIONS.iter().filter_map(reason).collect()
+    }
 }
 
 impl SizeRuns {

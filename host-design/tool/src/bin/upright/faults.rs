@@ -82,10 +82,9 @@ fn kind(name: &str) -> Result<Defect, String> {
 impl FaultsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        match (self.swing_up, self.jog, self.shake) {
-            (true, ..) => rig.refuse_acceleration("faults --swing-up")?,
-            (_, true, _) => rig.refuse_acceleration("faults --jog")?,
-            (.., true) => rig.refuse_acceleration("faults --shake")?,
+        match (self.swing_up, self.shake) {
+            (true, _) => rig.refuse_acceleration("faults --swing-up")?,
+            (_, true) => rig.refuse_acceleration("faults --shake")?,
             _ if self.target != TargetOption::Host => rig.refuse_acceleration("faults --target")?,
             _ => {}
         }

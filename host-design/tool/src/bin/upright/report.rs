@@ -71,9 +71,6 @@ impl ReportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         self.prepare()?;
         let (rig, certified, table) = self.variation.designed()?;
-        if self.imperfections {
-            rig.refuse_acceleration("report --imperfections")?;
-        }
         let imperfections = if self.imperfections { search(&rig, &table)? } else { Vec::new() };
         let motions = with_swing_up(&self.variation.rig, &rig, &table);
         let pushes = match &motions {

@@ -80,7 +80,13 @@ pub(crate) struct RobustCommand {
 impl RobustCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("robust")?;
+        let is_force = rig.actuator.input().is_force();
+        for (option, given) in [("--cart-friction", self.cart_friction), ("--latency", self.latency)] {
+            if given.is_some() && !is_force {
+                let text = format!("{option}: not with kind = \"acceleration\", as in [robust]");
+                return Err(Failure::argument(text));
+            }
+        }
         let tolerances = self.tolerances(&rig);
         let settings =
             JudgeSettings { runs: self.runs.into(), duration_s: self.duration, ..JudgeSettings::of(&rig) };
@@ -95,7 +101,11 @@ impl RobustCommand {
             with_progress(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
                 .map_err(failed)?;
         if let (Some(path), Some(front)) = (&self.svg, &front) {
-            let figure = front_figure(front, &format!("{}: least ripple that survives", rig.name));
+            let figure = front_figure(
+                front,
+                rig.actuator.input(),
+                &format!("{}: least ripple that survives", rig.name),
+            );
             write_atomically(path, figure.svg()?.as_bytes())?;
         }
         let differs = match &self.out {

@@ -1,7 +1,7 @@
 //! The option `--board`, of all commands that build an image for a board.
 
 use clap::Args;
-use upright_tool::image::BoardName;
+use upright_tool::image::{BoardName, NoBoard, PicoBoard};
 
 #[derive(Args)]
 pub(super) struct BoardOption {
@@ -15,22 +15,19 @@ pub(super) struct BoardOption {
 pub(super) enum AnyBoard {
     /// A board that the virtual board stands for.
     F4(BoardName),
-    /// The Raspberry Pi Pico.
-    Pico,
+    /// The Raspberry Pi Pico and the Pico 2.
+    Pico(PicoBoard),
 }
-
-/// Name of the Pico on the command line.
-pub(super) const PICO: &str = "pico";
 
 impl std::str::FromStr for AnyBoard {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        match name.parse() {
-            _ if name == PICO => Ok(Self::Pico),
-            Ok(board) => Ok(Self::F4(board)),
-            Err(error) => Err(format!("{error}, {PICO}")),
+        if let Some(board) = PicoBoard::ALL.into_iter().find(|board| board.name() == name) {
+            return Ok(Self::Pico(board));
         }
+        let others = PicoBoard::ALL.map(PicoBoard::name).join(", ");
+        name.parse().map(Self::F4).map_err(|error: NoBoard| format!("{error}, {others}"))
     }
 }
 
@@ -38,7 +35,7 @@ impl std::fmt::Display for AnyBoard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::F4(board) => board.fmt(f),
-            Self::Pico => f.pad(PICO),
+            Self::Pico(board) => f.pad(board.name()),
         }
     }
 }
@@ -57,10 +54,10 @@ mod tests {
     #[test]
     fn every_board_is_known_by_the_name_that_it_prints() {
         let f4 = BoardName::ALL.map(AnyBoard::F4);
-        for board in f4.into_iter().chain([AnyBoard::Pico]) {
+        for board in f4.into_iter().chain(PicoBoard::ALL.map(AnyBoard::Pico)) {
             assert_eq!(board.to_string().parse(), Ok(board));
         }
         let refused = "picot".parse::<AnyBoard>().unwrap_err();
-        assert!(refused.contains("nucleo-f446, pico"), "{refused}");
+        assert!(refused.contains("nucleo-f446, pico, pico2"), "{refused}");
     }
 }

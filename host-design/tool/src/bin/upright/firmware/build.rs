@@ -13,8 +13,8 @@ use crate::failure::Failure;
 use crate::variation::Wanted;
 
 /// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
-/// tick takes longer than a quarter of its period. For a Pico, it prints the path of the UF2 file, beside which the ELF
-/// file is, and does not run it.
+/// tick takes longer than a quarter of its period. For a Pico or Pico 2, it prints the path of the UF2 file, beside
+/// which the ELF file is, and does not run it.
 ///
 /// Uses the compiler of rustup if its target thumbv7em-none-eabihf is installed, otherwise that of Debian. If there is
 /// neither, the exit status is 4, and the message says what to install.
@@ -42,7 +42,7 @@ impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::of(self.transitions) };
         let image = match self.on.board {
-            AnyBoard::Pico => built_for_pico(self.rig.as_deref(), wanted)?.uf2,
+            AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), wanted)?.uf2,
             AnyBoard::F4(board) => {
                 let image = built(ImageKind::Board(board), self.rig.as_deref(), wanted)?;
                 check_ticks(board, self.rig.as_deref(), wanted, &image)?;

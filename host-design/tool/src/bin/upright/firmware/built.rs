@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, ImageKind, PicoImage};
+use upright_tool::image::{self, ImageKind, PicoBoard, PicoImage};
 
 use crate::failure::Failure;
 use crate::progress::with_spinner;
@@ -19,13 +19,17 @@ pub(super) fn built(kind: ImageKind, rig: Option<&Path>, wanted: Wanted) -> Resu
     Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
 }
 
-/// Builds the image for a Pico.
-pub(super) fn built_for_pico(rig: Option<&Path>, wanted: Wanted) -> Result<PicoImage, Failure> {
+/// Builds the image for a Pico or a Pico 2.
+pub(super) fn built_for_pico(
+    board: PicoBoard,
+    rig: Option<&Path>,
+    wanted: Wanted,
+) -> Result<PicoImage, Failure> {
     let Some(path) = rig else {
         return Err(Failure::argument("name a rig file: an image for a pico is built from one"));
     };
     let (rig, table) = designed(path, wanted)?;
-    Ok(with_spinner("building the image", || image::build_pico(&rig, &table))?)
+    Ok(with_spinner("building the image", || image::build_pico(board, &rig, &table))?)
 }
 
 /// Reads this rig file and designs its table, with the stored motions.

@@ -1,23 +1,26 @@
-//! The drive that a Raspberry Pi Pico shows while BOOTSEL is held at power-on.
+//! The drive that a Raspberry Pi Pico or Pico 2 shows while BOOTSEL is held at power-on.
 
 use std::path::{Path, PathBuf};
 
+use upright_tool::image::PicoBoard;
+
 use crate::failure::Failure;
 
-/// A file that the boot loader puts on its drive, and a line of it.
+/// A file that the boot loader puts on its drive. A line of it names the board.
 const INFO: &str = "INFO_UF2.TXT";
-const BOARD: &str = "Board-ID: RPI-RP2";
 
-/// Copies a UF2 file to the drive. The Pico then restarts with it.
-pub(super) fn copy_to_drive(uf2: &Path) -> Result<(), Failure> {
-    let Some(drive) = drive(&places()) else {
+/// Copies a UF2 file to the drive. The board then restarts with it.
+pub(super) fn copy_to_drive(board: PicoBoard, uf2: &Path) -> Result<(), Failure> {
+    let Some(drive) = drive(board, &places()) else {
         return Err(Failure::check(format!(
-            "no Pico: hold its BOOTSEL button while you plug it in, and run this again; or copy {} to the drive RPI-RP2",
-            uf2.display()
+            "no {}: hold its BOOTSEL button while you plug it in, and run this again; or copy {} to the drive {}",
+            board.product(),
+            uf2.display(),
+            board.drive()
         )));
     };
     std::fs::copy(uf2, drive.join("upright.uf2"))?;
-    println!("copied to {}: the Pico restarts with it", drive.display());
+    println!("copied to {}: the {} restarts with it", drive.display(), board.product());
     Ok(())
 }
 
@@ -32,13 +35,14 @@ fn places() -> Vec<PathBuf> {
     places
 }
 
-/// The drive of a Pico: in one of these folders, or a drive letter of Windows.
-fn drive(places: &[PathBuf]) -> Option<PathBuf> {
+/// The drive of this board: in one of these folders, or a drive letter of Windows.
+fn drive(board: PicoBoard, places: &[PathBuf]) -> Option<PathBuf> {
+    let line = format!("Board-ID: {}", board.drive());
     let letters = ('D'..='Z').filter(|_| cfg!(windows)).map(|letter| PathBuf::from(format!("{letter}:\\")));
     let mounted = places.iter().flat_map(|place| folders(place)).chain(letters);
     mounted.into_iter().find(|folder| {
         std::fs::read_to_string(folder.join(INFO))
-            .is_ok_and(|text| text.lines().any(|line| line.trim() == BOARD))
+            .is_ok_and(|text| text.lines().any(|text_line| text_line.trim() == line))
     })
 }
 
@@ -52,12 +56,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_drive_of_a_pico_is_found() {
+    fn only_the_drive_of_this_board_is_found() {
         let place = tempfile::tempdir().unwrap();
         let stick = place.path().join("stick");
         std::fs::create_dir(&stick).unwrap();
         std::fs::write(stick.join(INFO), "UF2 Bootloader\nBoard-ID: another\n").unwrap();
-        assert_eq!(drive(&[place.path().to_owned()]), None);
+        assert_eq!(drive(PicoBoard::Pico, &[place.path().to_owned()]), None);
         let pico = place.path().join("RPI-RP2");
         std::fs::create_dir(&pico).unwrap();
         std::fs::write(
@@ -65,6 +69,7 @@ mod tests {
             "UF2 Bootloader v3.0\r\nModel: Raspberry Pi RP2\r\nBoard-ID: RPI-RP2\r\n",
         )
         .unwrap();
-        assert_eq!(drive(&[place.path().to_owned()]), Some(pico));
+        assert_eq!(drive(PicoBoard::Pico, &[place.path().to_owned()]), Some(pico));
+        assert_eq!(drive(PicoBoard::Pico2, &[place.path().to_owned()]), None);
     }
 }

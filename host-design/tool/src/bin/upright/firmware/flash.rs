@@ -16,7 +16,7 @@ use crate::variation::Wanted;
 const PROBE_RS: &str = "probe-rs";
 
 /// Builds and checks the image of a board as `build` does, writes it to the board with probe-rs, verifies it, and
-/// starts it. For a Pico, it copies the image to the drive that appears while BOOTSEL is held at power-on.
+/// starts it. For a Pico or Pico 2, it copies the image to the drive that appears while BOOTSEL is held at power-on.
 ///
 /// The firmware starts disarmed: the motor stays off.
 #[derive(Args)]
@@ -41,8 +41,8 @@ impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::of(self.transitions) };
         let board = match self.on.board {
-            AnyBoard::Pico => {
-                return copy_to_drive(&built_for_pico(self.rig.as_deref(), wanted)?.uf2);
+            AnyBoard::Pico(board) => {
+                return copy_to_drive(board, &built_for_pico(board, self.rig.as_deref(), wanted)?.uf2);
             }
             AnyBoard::F4(board) => board,
         };

@@ -18,8 +18,8 @@ use crate::variation::Wanted;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
 /// panic; exit status 1 if, without its tables, it takes more than 48 KiB of code or 8 KiB of static RAM, if it takes
-/// more than 5 KiB of stack, or if it can panic or allocate. A Pico's image may take 72 KiB of code and 8 KiB of stack;
-/// its crates for USB can panic, and its exit status is 1 if an interrupt can, such as the tick.
+/// more than 5 KiB of stack, or if it can panic or allocate. The image of a Pico or Pico 2 may take 72 KiB of code and
+/// 8 KiB of stack; its crates for USB can panic, and its exit status is 1 if an interrupt can, such as the tick.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -45,7 +45,7 @@ impl SizeCommand {
         let path = match self.elf {
             Some(path) => path,
             None => match self.on.board {
-                AnyBoard::Pico => built_for_pico(self.rig.as_deref(), Wanted::SwingUp)?.elf,
+                AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), Wanted::SwingUp)?.elf,
                 AnyBoard::F4(board) => built(ImageKind::Board(board), self.rig.as_deref(), Wanted::SwingUp)?,
             },
         };

@@ -3,16 +3,16 @@
 use core::fmt::Write;
 
 use upright_design::number::significant;
-use upright_design::rig::{PolePlacement, Rig, Tolerances};
+use upright_design::rig::{CartInput, PolePlacement, Rig, Tolerances};
 use upright_design::robust::{Choice, Chosen, Front, JudgeSettings, Judgement, LawNumbers, LawRipple};
 
 /// The choice for each law, then the front.
 pub(super) fn chosen(rig: &Rig, tolerances: &Tolerances, choice: &Choice, front: Option<&Front>) -> String {
     let mut out = head(rig, tolerances);
     // Writing into a String cannot fail.
-    let _ = write_choice(&mut out, choice);
+    let _ = write_choice(&mut out, choice, rig.actuator.input());
     if let Some(front) = front {
-        let _ = write_front(&mut out, front);
+        let _ = write_front(&mut out, front, rig.actuator.input().unit());
     }
     out
 }
@@ -32,7 +32,7 @@ pub(super) fn judged(
     );
     for judgement in laws {
         let _ = writeln!(out, "\n{}", judgement.law);
-        let _ = write_judgement(&mut out, judgement);
+        let _ = write_judgement(&mut out, judgement, rig.actuator.input());
     }
     out
 }
@@ -44,7 +44,7 @@ fn head(rig: &Rig, tolerances: &Tolerances) -> String {
     format!("{}: {}\n", rig.name, stated.join(", "))
 }
 
-fn write_choice(out: &mut String, choice: &Choice) -> core::fmt::Result {
+fn write_choice(out: &mut String, choice: &Choice, input: CartInput) -> core::fmt::Result {
     let factor = significant(choice.joint_noise_factor, 3);
     writeln!(out, "joint noise × {factor}: {}", list(&choice.joint_noise))?;
     writeln!(out, "judged in runs with shares of friction, zeros and latency")?;
@@ -53,7 +53,7 @@ fn write_choice(out: &mut String, choice: &Choice) -> core::fmt::Result {
         match &candidate.numbers {
             LawNumbers::Weights(weights) => {
                 writeln!(out, "  state_weights   {}", list(&weights.state_weights))?;
-                writeln!(out, "  force_weight    {}", significant(weights.force_weight, 6))?;
+                writeln!(out, "  {:<15} {}", input.weight_key(), significant(weights.force_weight, 6))?;
             }
             LawNumbers::Poles(PolePlacement::Response { far_poles, .. }) => {
                 writeln!(out, "  far_poles       {}", list(far_poles))?;
@@ -61,14 +61,16 @@ fn write_choice(out: &mut String, choice: &Choice) -> core::fmt::Result {
             LawNumbers::Poles(PolePlacement::Poles(_)) => {}
         }
         let own = own_ripple_n.map_or("not stable".to_owned(), |ripple| significant(ripple, 3));
-        writeln!(out, "  predicted ripple {} N (as in the file: {own})", significant(*ripple_n, 3))?;
-        write_judgement(out, judgement)?;
+        let (ripple, unit) = (significant(*ripple_n, 3), input.unit());
+        writeln!(out, "  predicted ripple {ripple} {unit} (as in the file: {own})")?;
+        write_judgement(out, judgement, input)?;
     }
     Ok(())
 }
 
-fn write_judgement(out: &mut String, judgement: &Judgement) -> core::fmt::Result {
-    let head = ["share", "survive", "force, N rms", "angle, mrad", "cart, mm", "ended by"];
+fn write_judgement(out: &mut String, judgement: &Judgement, input: CartInput) -> core::fmt::Result {
+    let force = if input.is_force() { "force, N rms" } else { "m/s² rms" };
+    let head = ["share", "survive", force, "angle, mrad", "cart, mm", "ended by"];
     let row = |[share, survived, force, angle, cart, ended_by]: [&str; 6]| {
         format!("  {share:<8}{survived:>12}{force:>15}{angle:>14}{cart:>11}   {ended_by}")
     };
@@ -89,7 +91,7 @@ fn write_judgement(out: &mut String, judgement: &Judgement) -> core::fmt::Result
     }
 }
 
-fn write_front(out: &mut String, front: &Front) -> core::fmt::Result {
+fn write_front(out: &mut String, front: &Front, unit: &str) -> core::fmt::Result {
     writeln!(out, "\nleast ripple at multiples of the tolerances (by one run of 10 s for each share)")?;
     for point in &front.0 {
         let scale = significant(point.scale, 3);
@@ -98,7 +100,7 @@ fn write_front(out: &mut String, front: &Front) -> core::fmt::Result {
             Some(best) => {
                 writeln!(out, "  × {scale:<5} joint noise × {}", significant(best.joint_noise_factor, 3))?;
                 for LawRipple { law, name, ripple_n } in &best.laws {
-                    writeln!(out, "          {law}: {} N, {name}", significant(*ripple_n, 3))?;
+                    writeln!(out, "          {law}: {} {unit}, {name}", significant(*ripple_n, 3))?;
                 }
             }
         }

@@ -23,6 +23,9 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
     for survival in &found.alone {
         write_survival(out, survival)?;
     }
+    for one in &found.left_out {
+        writeln!(out, "  {:<26}{}", one.key, one.reason)?;
+    }
     match &found.together {
         None => writeln!(out, "  the rig file has no [reality]"),
         Some(all) => writeln!(out, "  [reality] of the rig file: {}", all.text(found.settings.seeds)),
