@@ -155,9 +155,8 @@ fn relaxed(
     Ok(last)
 }
 
-/// States how many runs would arrive if the tolerances of `[robust]` included the friction and the wrong zeros of
-/// `[reality]`, and with which smaller errors of masses and friction enough would; `runs` makes the runs of a changed
-/// rig.
+/// States with which smaller errors of masses and friction enough runs would arrive, or how many with the smallest that
+/// were tried; `runs` makes the runs of a changed rig.
 ///
 /// # Errors
 /// Those of `runs`.
@@ -165,31 +164,17 @@ pub(super) fn smaller_errors(
     rig: &Rig,
     runs: impl Fn(&Rig) -> Result<RandomRuns, SwingUpError>,
 ) -> Result<String, SwingUpError> {
-    let arrive = |remedy: &Remedy| -> Result<(bool, String), SwingUpError> {
-        let found = runs(&remedy.rig)?;
-        let text = format!("{} of {} arrive with {}", found.arrived, found.runs, remedy.text());
-        Ok((is_enough(&remedy.rig, &found), text))
-    };
-    let (mut remedy, mut texts) = (Remedy::of(rig), Vec::new());
-    if remedy.tolerate_reality() {
-        let (is_enough, text) = arrive(&remedy)?;
-        texts.push(text);
-        if is_enough {
-            return Ok(texts.remove(0));
-        }
-    }
     let mut last = String::new();
     for factor in NARROWER {
-        let mut remedy = remedy.clone();
+        let mut remedy = Remedy::of(rig);
         remedy.narrow(factor);
-        let is_enough;
-        (is_enough, last) = arrive(&remedy)?;
-        if is_enough {
+        let found = runs(&remedy.rig)?;
+        last = format!("{} of {} arrive with {}", found.arrived, found.runs, remedy.text());
+        if is_enough(&remedy.rig, &found) {
             break;
         }
     }
-    texts.push(last);
-    Ok(texts.join("; "))
+    Ok(last)
 }
 
 #[cfg(test)]

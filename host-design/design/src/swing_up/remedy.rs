@@ -1,7 +1,7 @@
 //! Changes of the rig file that relax one limit of the plans.
 
 use crate::number::rounded;
-use crate::rig::{PerJoint, PlantDescription, Rig};
+use crate::rig::{PlantDescription, Rig};
 
 /// Significant digits of an advised number. It is tried as it is printed.
 const DIGITS: usize = 3;
@@ -116,34 +116,6 @@ impl Remedy {
         self.rig.swing_up.get_or_insert_default().longest_s = Some(longest_s);
         self.keys.push(format!("swing_up.longest_s = {longest_s}"));
         Some(())
-    }
-
-    /// States friction and wrong zeros of `[reality]` in `[robust]` if they are more than fault detection tolerates;
-    /// returns whether that changes anything.
-    pub(super) fn tolerate_reality(&mut self) -> bool {
-        let Some(mut tolerances) = self.rig.detection_tolerances() else { return false };
-        let links = self.rig.links();
-        let reality = &self.rig.reality;
-        let largest = |each: &PerJoint| (0..links).map(|joint| each.of(joint).abs()).fold(0.0, f64::max);
-        let joint_n_m = largest(&reality.friction.joint_friction_n_m);
-        let zero_rad = largest(&reality.sensors.homing_error_rad);
-        let cart_n = reality.friction.cart_friction_n;
-        let stated = [
-            ("joint_friction_n_m", &mut tolerances.joint_friction_n_m, joint_n_m),
-            ("cart_friction_n", &mut tolerances.cart_friction_n, cart_n),
-            ("homing_error_rad", &mut tolerances.homing_error_rad, zero_rad),
-        ];
-        for (key, tolerance, real) in stated {
-            if real > *tolerance {
-                *tolerance = real;
-                self.keys.push(format!("robust.{key} = {real}"));
-            }
-        }
-        let changes = !self.keys.is_empty();
-        if changes {
-            self.rig.robust = Some(tolerances);
-        }
-        changes
     }
 
     /// Multiplies the errors of masses and friction that a motion has to survive by `factor`.
