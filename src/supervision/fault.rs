@@ -174,7 +174,8 @@ impl Fault {
             fault: Fault::Motor,
             name: "motor",
             condition: "the rig does not move as the motor's force should move it: motor dead, weak, stuck or reversed, or \
-                        a collision; ticks count from when the missing motion is more than the encoders' steps hide",
+                        a collision; ticks count from when the missing motion is more than the encoders' steps hide, and \
+                        while balancing with a force, from when it is more than a hand would explain",
             reaction: Reaction::Ticks(20),
             remedy: "check motor, coupling and belt, and the masses in the rig file; on a stepper also its driver, current and \
                      switches of the microsteps; keep hands off the cart",

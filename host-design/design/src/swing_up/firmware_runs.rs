@@ -4,8 +4,9 @@ use core::ops::Range;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use upright::protocol::message::Request;
+use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::closed_loop::deviation;
@@ -76,8 +77,8 @@ impl Condition {
 /// Results of a set of runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FirmwareRuns {
-    /// Runs in which the firmware refused to raise the rig, because the links do not hang.
-    pub refused: usize,
+    /// Runs in which the firmware did not begin to raise the rig, by the reason.
+    pub refused: BTreeMap<String, usize>,
     /// Of the runs that were not refused: those that are upright until they are lowered.
     pub raise: RandomRuns,
     /// Of those that are upright: those that hang in the end, the motor off, without a fault.
@@ -89,7 +90,7 @@ pub struct FirmwareRuns {
 impl FirmwareRuns {
     /// The raising, counted over all runs: a run that was refused has not arrived.
     pub fn raise_in_all(&self) -> RandomRuns {
-        let runs = self.refused + self.raise.runs;
+        let runs = self.refused.values().sum::<usize>() + self.raise.runs;
         RandomRuns { runs, interval: wilson(self.raise.arrived, runs), ..self.raise.clone() }
     }
 
@@ -103,7 +104,7 @@ impl FirmwareRuns {
         let mut faults: Vec<_> = self.faults.iter().collect();
         faults.sort_by_key(|(_, count)| core::cmp::Reverse(**count));
         let faults = faults.into_iter().map(|(fault, count)| format!("fault {fault} ended {count}"));
-        let refused = (self.refused > 0).then(|| format!("{} did not hang at the start", self.refused));
+        let refused = self.refused.iter().map(|(reason, count)| format!("{count} did not begin ({reason})"));
         faults.chain(refused).collect::<Vec<_>>().join(", ")
     }
 }
@@ -111,7 +112,7 @@ impl FirmwareRuns {
 /// Result of one run.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Reached {
-    refused: bool,
+    refused: Option<String>,
     arrived: bool,
     hung: bool,
     fault: Option<String>,
@@ -146,10 +147,13 @@ pub fn firmware_runs(
             .map_err(|error| SwingUpError::Firmware(error.to_string()))
     };
     let all: Vec<Reached> = study.outcomes(condition.name, seeds.end - seeds.start, one)?;
-    let mut faults = BTreeMap::new();
-    for fault in all.iter().filter_map(|run| run.fault.clone()) {
-        *faults.entry(fault).or_default() += 1;
-    }
+    let counts = |what: &dyn Fn(&Reached) -> Option<String>| {
+        let mut counts = BTreeMap::new();
+        for name in all.iter().filter_map(what) {
+            *counts.entry(name).or_default() += 1;
+        }
+        counts
+    };
     let counted = |begun: &dyn Fn(&Reached) -> bool, arrived: &dyn Fn(&Reached) -> bool, motion: usize| {
         let tried = all.iter().filter(|run| begun(run)).count();
         let arrived = || all.iter().filter(|run| arrived(run));
@@ -165,11 +169,22 @@ pub fn firmware_runs(
         }
     };
     Ok(FirmwareRuns {
-        refused: all.iter().filter(|run| run.refused).count(),
-        raise: counted(&|run| !run.refused, &|run| run.arrived, 0),
+        refused: counts(&|run| run.refused.clone()),
+        raise: counted(&|run| run.refused.is_none(), &|run| run.arrived, 0),
         lower: counted(&|run| run.arrived, &|run| run.hung, 1),
-        faults,
+        faults: counts(&|run| run.fault.clone()),
     })
+}
+
+/// The first reason that the firmware gives against raising the links, without its remedy.
+fn why_not_begun(harness: &mut Harness<'_>) -> Result<String, HarnessError> {
+    let inputs = harness.inputs();
+    let reason = match harness.session.ask(Request::Goto(Equilibrium::UPRIGHT), &inputs) {
+        Err(HarnessError::Refused { answer: Answer::NotNow(inhibits), .. }) => inhibits.texts().next(),
+        answer => answer.map(|_| None)?,
+    };
+    let text = reason.unwrap_or("it took longer than a minute");
+    Ok(text.split_once(':').map_or(text, |(reason, _)| reason).to_owned())
 }
 
 fn raised_and_lowered(
@@ -187,7 +202,9 @@ fn raised_and_lowered(
     harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
     let mut reached = Reached::default();
     let mut output = match harness.raise(None) {
-        Err(HarnessError::NotBalancing(_)) => return Ok(Reached { refused: true, ..reached }),
+        Err(HarnessError::NotBalancing(_)) => {
+            return Ok(Reached { refused: Some(why_not_begun(&mut harness)?), ..reached });
+        }
         output => output?,
     };
     let last = ticks(scenario.duration_s);

@@ -237,6 +237,23 @@ fn a_motion_that_the_supervisor_ends_has_not_arrived() {
 }
 
 #[test]
+fn a_motion_that_does_not_begin_has_the_reason_of_the_firmware() {
+    let name = "single-quanser-ip02";
+    let (mut rig, table) = with_stored_motions(name);
+    let reasons = |rig: &Rig, condition: &Condition| {
+        let found =
+            firmware_runs(rig, &table, stored_motions(name), condition, 1..3, &Study::whole()).unwrap();
+        found.refused.into_iter().collect::<Vec<_>>()
+    };
+    let condition = Condition::asked(&rig);
+    assert_eq!(reasons(&rig, &condition), []);
+    // The motor's small push does not move the cart.
+    rig.reality.friction.cart_friction_n = 3.0;
+    let reason = "the motor's sign is not checked since power-up".to_owned();
+    assert_eq!(reasons(&rig, &condition), [(reason, 2)]);
+}
+
+#[test]
 fn with_reversed_gains_no_random_run_arrives() {
     let name = "single-quanser-ip02";
     let (_, mut table) = with_stored_motions(name);

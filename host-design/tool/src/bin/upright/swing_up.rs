@@ -268,9 +268,8 @@ struct SwingUpRow {
 fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failure> {
     let line = |SwingUpRow { condition, runs }: &SwingUpRow| {
         let FirmwareRuns { refused, raise, lower, faults } = runs;
-        let refused = (*refused > 0).then(|| format!("not hanging: {refused}"));
-        let faults = faults.iter().map(|(fault, count)| format!("{fault}: {count}"));
-        let ended = refused.into_iter().chain(faults).collect::<Vec<_>>().join(", ");
+        let ended = refused.iter().chain(faults).map(|(reason, count)| format!("{reason}: {count}"));
+        let ended = ended.collect::<Vec<_>>().join(", ");
         let [raised, lowered] = [raise, lower].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
         format!("| {} | {} | {raised} | {lowered} | {ended} |\n", rig.name, condition.name)
     };
