@@ -28,7 +28,7 @@ pub struct Healthy {
     pub fault: Option<String>,
     /// Number of measurements that the firmware rejected.
     pub rejected: u32,
-    /// Largest innovation in the telemetry, as a share of its threshold.
+    /// Largest innovation in the telemetry, as a share of the largest one that is no fault.
     pub closest: f32,
 }
 
@@ -47,7 +47,7 @@ pub struct FalseAlarms {
     pub most_per_hour: f64,
     /// Number of measurements that the firmware rejected.
     pub rejected: u64,
-    /// Largest innovation in the telemetry, as a share of its threshold.
+    /// Largest innovation in the telemetry, as a share of the largest one that is no fault.
     pub closest: f32,
 }
 
@@ -191,6 +191,8 @@ fn balanced(
     let (side, keep_alive) = (ticks(SIDE_S).max(1), ticks(KEEP_ALIVE.as_secs_f64()).max(1));
     let [low, high] = table.limits.rail_m.map(f64::from);
     let setpoint_m = SETPOINT_M.min(0.5 * high.min(-low)) as f32;
+    let thresholds = &table.thresholds;
+    let largest = if thresholds.survives_pushes() { &thresholds.push } else { &thresholds.innovation };
     let mut found = Healthy { balanced_s: 0.0, fault: None, rejected: 0, closest: 0.0 };
     for number in 0..ticks(seconds) {
         if number % side == 0 {
@@ -202,8 +204,8 @@ fn balanced(
         tick(harness)?;
         while harness.session.next_reply().is_some() {}
         while let Some(telemetry) = harness.session.next_telemetry() {
-            for (innovation, threshold) in telemetry.innovation.iter().zip(&table.thresholds.innovation) {
-                found.closest = found.closest.max(innovation.abs() / threshold);
+            for (innovation, largest) in telemetry.innovation.iter().zip(largest) {
+                found.closest = found.closest.max(innovation.abs() / largest);
             }
         }
         found.fault = harness.session.fault().map(|fault| fault.to_string());
