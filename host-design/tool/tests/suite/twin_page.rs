@@ -280,30 +280,53 @@ fn the_page_records_draws_its_scopes_and_fits_on_a_telephone() {
 #[test]
 fn a_minute_of_running_needs_no_more_memory() {
     let Some(mut browser) = browser() else { return };
-    let twin = Twin::start("quadruple-paper", &[]);
-    browser.open_address(&twin.address, 640, "light", "screen");
-    until_state(&mut browser, "Balancing");
-    set_speed(&mut browser, FASTEST);
-    let_pass(&mut browser, 10.0);
-    let (before, resident) = (browser.heap(), resident_kib(&twin));
-    let frames = browser.value("upright.seen.frames").as_f64().unwrap();
-    let worked_s = browser.worked_s();
-    let begin = Instant::now();
-    let_pass(&mut browser, 50.0);
-    let seconds = begin.elapsed().as_secs_f64();
-    let frames = browser.value("upright.seen.frames").as_f64().unwrap() - frames;
-    let (rate, work_ms) = (frames / seconds, 1e3 * (browser.worked_s() - worked_s) / frames);
-    let (after, grown) = (browser.heap(), resident_kib(&twin) as f64 / resident as f64);
-    assert_eq!(browser.value(STATE), "Balancing");
+    // On a busy machine a page may be silent for so long that the motor goes off: then nothing is measured.
+    let minute = (0..3).find_map(|_| Minute::measure(&mut browser));
+    let Minute { rate, work_ms, page, server_grown } = minute.expect("the motor went off three times");
+    let [before, after] = page;
+    eprintln!(
+        "{rate:.1} frames per second, {work_ms:.1} ms of scripts and layout for each; page {before} to {after} bytes; server {server_grown:.3} times"
+    );
     // At this speed, the page gets a tenth of the pictures of a minute of real time, with as much telemetry.
     assert!(after < 1.02 * before + 1e5, "the page grows from {before} to {after} bytes");
-    assert!(grown < 1.02, "the server grows {grown} times");
-    eprintln!(
-        "{rate:.1} frames per second, {work_ms:.1} ms of scripts and layout for each; page {before} to {after} bytes; server {grown:.3} times"
-    );
+    assert!(server_grown < 1.02, "the server grows {server_grown} times");
     // A machine without a graphics card that runs other tests meanwhile draws fewer than 60.
     assert!(rate > 3.0, "{rate} frames per second");
     assert!(work_ms < 1e3 / 60.0, "scripts and layout take {work_ms} ms for each frame");
+}
+
+/// What is measured in a minute of balancing.
+struct Minute {
+    /// Frames per second.
+    rate: f64,
+    /// Scripts and layout for each frame (ms).
+    work_ms: f64,
+    /// Memory of the page before and after (bytes).
+    page: [f64; 2],
+    /// Memory of the server after, as a multiple of that before.
+    server_grown: f64,
+}
+
+impl Minute {
+    /// None if the motor went off.
+    fn measure(browser: &mut Browser) -> Option<Self> {
+        let twin = Twin::start("quadruple-paper", &[]);
+        browser.open_address(&twin.address, 640, "light", "screen");
+        until_state(browser, "Balancing");
+        set_speed(browser, FASTEST);
+        let_pass(browser, 10.0);
+        let (before, resident) = (browser.heap(), resident_kib(&twin));
+        let frames = browser.value("upright.seen.frames").as_f64().unwrap();
+        let worked_s = browser.worked_s();
+        let begin = Instant::now();
+        let_pass(browser, 50.0);
+        let seconds = begin.elapsed().as_secs_f64();
+        let frames = browser.value("upright.seen.frames").as_f64().unwrap() - frames;
+        let (rate, work_ms) = (frames / seconds, 1e3 * (browser.worked_s() - worked_s) / frames);
+        let page = [before, browser.heap()];
+        let server_grown = resident_kib(&twin) as f64 / resident as f64;
+        (browser.value(STATE) == "Balancing").then_some(Self { rate, work_ms, page, server_grown })
+    }
 }
 
 /// Memory of the server without the pages of its file, which the system drops and loads again as it likes (KiB); 1
