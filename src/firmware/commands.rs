@@ -27,6 +27,7 @@ const fn number(digits: &str) -> u8 {
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Carries out a command and returns the answer.
+    #[inline(never)]
     pub(super) fn answer(&mut self, command: &Command) -> Answer {
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let rejected = |reason| Answer::Rejected(InvalidRequest::Controller(reason));
@@ -131,6 +132,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// [`Inhibits::HELD`] if the command `id`, which would turn the motor on, comes from a key held since a fault.
+    #[inline(never)]
     pub(super) fn held_inhibit(&self, id: u64) -> Inhibits {
         let is_held = self.rearm_lockout_ticks > 0 || id <= self.last_clear_id;
         Inhibits::HELD.when(is_held && self.supervisor.state() != State::Fault)

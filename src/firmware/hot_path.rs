@@ -1,7 +1,8 @@
 //! The part of a tick that has to be fast, compiled for the rig of the gain table.
 //!
 //! Generic code is compiled where its sizes become known. The image is compiled for size and this library for speed,
-//! so what the image calls here is fast, and everything else is small.
+//! so what the image calls here is fast, and everything else is small. What several places call, and need not be that
+//! fast, is `#[inline(never)]`: one copy each keeps the image within its limit.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};

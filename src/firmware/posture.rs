@@ -31,6 +31,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     /// [`Inhibits::OFF_CENTRE`] if the cart is outside the soft limits of the rail at these counts.
+    #[inline(never)]
     pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY]) -> Inhibits {
         let [low, high] = self.table.limits.rail_m;
         let step = self

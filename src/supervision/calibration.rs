@@ -21,6 +21,7 @@ pub struct Calibration<const NY: usize> {
 
 impl<const NY: usize> Calibration<NY> {
     /// Not homed, signs unchecked.
+    #[inline(never)]
     pub fn new(limits: &Limits<NY>) -> Self {
         Self {
             homing: Homing::default(),
@@ -156,6 +157,7 @@ impl<const NY: usize> Calibration<NY> {
     }
 
     /// Cancels homing and a sign check that are in progress; what is finished stays.
+    #[inline(never)]
     pub fn cancel(&mut self) {
         if matches!(self.homing, Homing::Touch { .. } | Homing::HoldStill) {
             self.homing = Homing::NotHomed;

@@ -168,7 +168,7 @@ impl<const NY: usize> Detection<NY> {
     }
 
     /// Tests the size of each innovation, and the motion of each counter that stands still.
-    #[inline(always)]
+    #[inline(never)]
     fn test_sensors(
         &mut self,
         thresholds: &Thresholds<NY>,
@@ -227,7 +227,7 @@ impl<const NY: usize> Detection<NY> {
     }
 
     /// Whether most of the force is missing, as with a dead motor, or about twice the force, as with one that is stuck.
-    #[inline]
+    #[inline(never)]
     fn finds_missing_force(&mut self, test: &MotorTest) -> bool {
         let (e, [missing, _]) = (self.motor_error, self.missing);
         self.sums.add(KEEP, e, missing);

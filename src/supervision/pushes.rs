@@ -179,7 +179,7 @@ impl<const NY: usize> Pushes<NY> {
 
 impl PushedSensor {
     /// Notes whether the counter stands still, and the innovation `e` (m or rad) closest to 0 since it does.
-    #[inline(always)]
+    #[inline(never)]
     fn watch(&mut self, counts: i32, e: f32, tick: u32) {
         let above = counts.wrapping_sub(self.lowest);
         if above as u32 > self.width {

@@ -64,6 +64,7 @@ impl<const NY: usize> SignCheck<NY> {
     }
 
     /// Takes the counts of a tick, and whether the links hang at rest.
+    #[inline(never)]
     pub fn update(&mut self, counts: &[i32; NY], at_rest: bool, sign_counts: &[i32; NY]) {
         match self.signs {
             Signs::Rest(next) if at_rest => (self.signs, self.start_counts) = (Signs::Move(next), *counts),
@@ -90,6 +91,7 @@ impl<const NY: usize> SignCheck<NY> {
 }
 
 /// The last sensor before `end` that has a sign to check.
+#[inline(never)]
 fn last_to_check<const NY: usize>(sign_counts: &[i32; NY], end: usize) -> Option<u8> {
     let sensors = sign_counts.iter().take(end).zip(0u8..);
     sensors.filter(|(counts, _)| **counts > 0).map(|(_, sensor)| sensor).last()

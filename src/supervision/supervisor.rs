@@ -49,6 +49,7 @@ impl Supervisor {
 
     /// Latches `cause` unless a fault is latched already: the first cause stays. Faults of the same tick are tripped
     /// in the order of [`Fault::PRECEDENCE`].
+    #[inline(never)]
     pub fn trip(&mut self, cause: Cause) {
         if self.state == State::Fault {
             return;

@@ -62,7 +62,7 @@ impl<const NY: usize> Thresholds<NY> {
 
     /// Whether every threshold is positive.
     pub(crate) fn is_sound(&self) -> bool {
-        let of_sensors = self.innovation.iter().chain(&self.frozen).chain(&self.push);
+        let of_sensors = [&self.innovation, &self.frozen, &self.push].into_iter().flatten();
         let thresholds = of_sensors.chain([&self.motor.ratio, &self.motor.energy]);
         thresholds.into_iter().all(|threshold| *threshold > 0.0)
     }
