@@ -57,7 +57,8 @@ fn assert_equal(run: &Recorded, answers: &[Answer]) -> u32 {
         answers.len(),
         on.len()
     );
-    assert!(stack < STACK / 2, "{stack} bytes of stack");
+    // The bound from the code is in docs/results/pico.md.
+    assert!(stack < STACK / 8 * 5, "{stack} bytes of stack");
     most
 }
 

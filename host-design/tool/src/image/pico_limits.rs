@@ -10,7 +10,7 @@ pub const PICO_ENCODERS: usize = 5;
 pub const PICO_TICK_S: [f64; 2] = [0.000_5, 0.1];
 
 /// Longest tick in cycles while a rig of one to four links balances, as measured in the emulator.
-pub const PICO_BALANCING_CYCLES: [u32; 4] = [24_500, 34_500, 50_000, 65_000];
+pub const PICO_BALANCING_CYCLES: [u32; 4] = [25_500, 35_500, 51_000, 65_000];
 /// The same while it follows a motion.
 pub const PICO_MOTION_CYCLES: [u32; 4] = [57_000, 94_000, 137_000, 188_000];
 /// Largest share of a period that a tick may take (%).
