@@ -124,8 +124,7 @@ impl Trial {
             counter_start: self.scenario.counter_start,
             ..Scenario::at_rest(rig, self.scenario.law)
         };
-        // The sensor that shows the motor's sign.
-        let sensor = usize::from(rig.actuator.acceleration.is_some());
+        let sensor = rig.actuator.input().motor_sensor();
         Self { phase: Phase::Jogging, scenario, onset, watched, sensor, ..self }
     }
 

@@ -4,7 +4,7 @@ use super::Design;
 use super::kalman::rounding_variances;
 use super::pushed::pushed;
 use super::tolerated::Tolerated;
-use crate::rig::{CartInput, Rig};
+use crate::rig::Rig;
 
 /// Share of the motor's force that may be missing.
 const MISSING_SHARE: f64 = 0.5;
@@ -74,8 +74,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     let by_hand = pushed(rig, design, kalman).unwrap_or_default();
     let push = by_hand.iter().zip(&innovation).map(|(by_hand, healthy)| healthy + by_hand).collect();
     let rounding = rounding_variances(rig, steps);
-    // What a drive with pulses does to the cart is known only from its own count; the first link shows it.
-    let sensor = usize::from(rig.actuator.input() == CartInput::Acceleration);
+    let sensor = rig.actuator.input().motor_sensor();
     let frozen = (variances.iter().zip(steps).zip(rounding).zip(&tolerated.corrected)).map(
         |(((s, step), r), bound)| {
             let corrected = (s - r).max(0.0) / (1.0 - keep * keep);

@@ -70,7 +70,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
             During::Balancing => {}
             // Movement of the cart, or of the first link, that is needed to determine the motor's sign.
             During::Jog => {
-                let sensor = usize::from(blind.steps.is_some());
+                let sensor = blind.motor_sensor();
                 blind.limits.sign_counts[sensor] = 0;
             }
             During::Shaking(_) => blind_while_shaken(&mut blind),

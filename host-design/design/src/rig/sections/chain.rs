@@ -81,6 +81,12 @@ impl CartInput {
         *self == CartInput::Force
     }
 
+    /// The sensor that shows what the motor does (0: cart, 1: first link). What a drive with pulses does to the cart is
+    /// known only from its own count.
+    pub fn motor_sensor(&self) -> usize {
+        usize::from(!self.is_force())
+    }
+
     /// Its unit.
     pub fn unit(&self) -> &'static str {
         if self.is_force() { "N" } else { "m/s²" }

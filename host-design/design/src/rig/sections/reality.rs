@@ -164,6 +164,11 @@ impl Default for Reality {
     }
 }
 
+/// Keys of what lies between a force and the cart.
+pub(super) fn of_force() -> Vec<&'static str> {
+    [DriveTrain::KEYS, DriverFaults::KEYS].concat().iter().map(|key| key.name).collect()
+}
+
 /// Reads `[reality]`, which needs a chain.
 pub(crate) fn reality(
     node: &Node<'_>,
@@ -239,9 +244,7 @@ fn within_the_rig(
         None => Ok(()),
     };
     if chain.input == CartInput::Acceleration {
-        let keys = [DriveTrain::KEYS, DriverFaults::KEYS].concat();
-        let of_force: Vec<&str> = keys.iter().map(|key| key.name).collect();
-        table.refuse_for_acceleration(&of_force)?;
+        table.refuse_for_acceleration(&of_force())?;
     }
     step_motor(table, &reality.step_motor, chain)?;
     if reality.drive_train.rotor_mass_kg.zip(chain.cart.mass_kg).is_some_and(|(mass, cart)| mass >= cart) {

@@ -6,7 +6,7 @@ use super::super::node::Node;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
 use super::chain::CartInput;
-use super::reality::Reality;
+use super::reality::{Reality, of_force};
 
 /// `[verify]`
 pub(crate) static VERIFY: Section = Section {
@@ -81,9 +81,7 @@ keys! {
 pub(crate) fn verify(node: &Node<'_>, input: CartInput, reality: &Reality) -> Result<Requirements, RigError> {
     let table = node.table(&VERIFY)?;
     if input == CartInput::Acceleration {
-        let of_force =
-            ["backlash_m", "belt_compliance_m_per_n", "driver_lag_s", "latency_s", "force_percent"];
-        table.refuse_for_acceleration(&of_force)?;
+        table.refuse_for_acceleration(&of_force())?;
         if reality.step_motor.holding_force_n.is_none() {
             table.refuse_for_acceleration(&["cart_friction_n"])?;
         }

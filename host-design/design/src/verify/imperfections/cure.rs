@@ -61,7 +61,7 @@ impl<'a> Cures<'a> {
         *match key {
             "mass_percent" => mass_percent,
             "joint_friction_n_m" => joint_friction_n_m,
-            "cart_friction_n" if self.rig.actuator.input() == CartInput::Force => cart_friction_n,
+            "cart_friction_n" if self.rig.actuator.input().is_force() => cart_friction_n,
             "homing_error_rad" => homing_error_rad,
             _ => return None,
         } = size;
