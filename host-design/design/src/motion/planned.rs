@@ -22,7 +22,7 @@ pub struct PlannedMotion {
     pub tick_s: f64,
     /// Reference states, steps + 1. With `u` held over the tick, the model goes from each to the next.
     pub x: Vec<Vec<f64>>,
-    /// Reference forces (N), steps.
+    /// Reference forces (N) or accelerations of the cart (m/s²), steps.
     pub u: Vec<f64>,
     /// Feedback gains K, 1×states, steps.
     pub k: Vec<Matrix<f64>>,
@@ -107,8 +107,8 @@ impl PlannedMotion {
         self.steps() as f64 * self.tick_s
     }
 
-    /// Largest force (N).
-    pub fn force_n(&self) -> f64 {
+    /// Largest force (N) or acceleration (m/s²).
+    pub fn input(&self) -> f64 {
         self.u.iter().fold(0.0, |most, u| most.max(u.abs()))
     }
 

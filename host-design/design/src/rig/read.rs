@@ -48,7 +48,7 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
         reality,
         actuator,
         tick,
-        swing_up: given(&swing_up::SWING_UP).map(|node| swing_up::swing_up(&node)).transpose()?,
+        swing_up: given(&swing_up::SWING_UP).map(|node| swing_up::swing_up(&node, input)).transpose()?,
         plant,
     };
     if rig.kalman.is_some() {

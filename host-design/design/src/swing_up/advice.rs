@@ -235,9 +235,9 @@ mod tests {
             "swing_up.rail_m = 0.5 and cart.travel_m = [-0.5, 0.5]"
         );
         let force = "swing_up.force_n = 10";
-        assert_eq!(relaxed(RigLimit::Force, force, 1.2), "swing_up.force_n = 12");
+        assert_eq!(relaxed(RigLimit::Input, force, 1.2), "swing_up.force_n = 12");
         assert_eq!(
-            relaxed(RigLimit::Force, force, 2.0),
+            relaxed(RigLimit::Input, force, 2.0),
             "swing_up.force_n = 20 and actuator.force_limit_n = 20 and actuator.supply_v = 15.4"
         );
         assert_eq!(relaxed(RigLimit::Speed, rail, 2.0), "limits.speed_m_per_s = 3");

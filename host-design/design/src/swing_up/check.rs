@@ -21,8 +21,8 @@ pub struct Peaks {
     /// Largest difference between a state and the adaptive integrator's result from the state before, in the units of
     /// the states.
     pub drift: f64,
-    /// Largest force (N).
-    pub force_n: f64,
+    /// Largest force (N) or acceleration (m/s²).
+    pub input: f64,
     /// Largest distance of the cart from the middle (m).
     pub position_m: f64,
     /// Largest speed of the cart (m/s).
@@ -78,7 +78,7 @@ pub(super) fn check(
     Ok(Peaks {
         duration_s: motion.duration_s(),
         drift,
-        force_n: motion.u.iter().fold(0.0, |most: f64, u| most.max(u.abs())),
+        input: motion.u.iter().fold(0.0, |most: f64, u| most.max(u.abs())),
         position_m: largest(&|x| x[0].abs()),
         speed_m_per_s: largest(&|x| x[1].abs()),
         rate_rad_per_s: largest(&|x| x.iter().skip(3).step_by(2).fold(0.0, |most: f64, w| most.max(w.abs()))),

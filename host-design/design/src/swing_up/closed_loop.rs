@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::SwingUpError;
+use super::problem::Bounds;
 use super::setting::Setting;
 use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
@@ -185,13 +186,18 @@ fn measured(setting: &Setting<'_>, trial: &TrackingTrial, state: &[f64], sensor:
     if trial.counts { libm::round(value / step) * step } else { value }
 }
 
-/// The force (N) that the actuator can deliver of a commanded one, at a speed of the cart.
-fn applied(setting: &Setting<'_>, force: f64, speed: f64) -> f64 {
-    let limit = setting.actuator.force_n;
-    let force = force.max(-limit).min(limit);
-    match setting.actuator.motor {
-        Some([stall, loss]) => force.max(-stall - loss * speed).min(stall - loss * speed),
-        None => force,
+/// What the actuator can deliver of a commanded force (N) or acceleration (m/s²), at a speed of the cart.
+fn applied(setting: &Setting<'_>, wanted: f64, speed: f64) -> f64 {
+    let Bounds { input: limit, motor, speed_m_per_s, .. } = setting.actuator;
+    let within = |input: f64| input.max(-limit).min(limit);
+    let input = within(wanted);
+    match (motor, speed_m_per_s) {
+        (Some([stall, loss]), _) => input.max(-stall - loss * speed).min(stall - loss * speed),
+        (None, Some(fastest)) => {
+            let next = (speed + input * setting.tick_s).max(-fastest).min(fastest);
+            within((next - speed) / setting.tick_s)
+        }
+        (None, None) => input,
     }
 }
 

@@ -34,7 +34,7 @@ pub struct Condition {
     pub spread: MotionSpread,
     /// Counts per turn of the joints' encoders, instead of the rig's; the table is designed with them.
     pub joint_counts: Option<f64>,
-    /// Whether the force is applied a tick later than the firmware assumes.
+    /// Whether the motor acts a tick later than the firmware assumes.
     pub is_late: bool,
 }
 
@@ -52,7 +52,7 @@ impl Condition {
             named("start off by 20 mm", MotionSpread { position_m: 0.02, ..usual }),
             named("zeros off by 0.3°", MotionSpread { zero_rad: 0.3 * degree, ..usual }),
             Self { joint_counts: Some(1024.0), ..named("1024 counts per turn", usual) },
-            Self { is_late: true, ..named("force a tick late", usual) },
+            Self { is_late: true, ..named("a tick late", usual) },
         ]
     }
 

@@ -26,7 +26,7 @@ pub(super) fn motion(
         factor * setting.weights[(i, j)]
     });
     let k =
-        feedback(&ticks, &weights, setting.force_weight, &setting.at_end(transition).cost, setting.tick_s);
+        feedback(&ticks, &weights, setting.input_weight, &setting.at_end(transition).cost, setting.tick_s);
     let mut filter = PathFilter::new(&*setting.dynamics, &setting.noise, states, setting.tick_s);
     filter.covariance = setting.at_start(transition).covariance.clone();
     let l: Result<Vec<Matrix<f64>>, _> =

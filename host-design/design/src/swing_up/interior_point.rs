@@ -78,7 +78,7 @@ impl Slacks {
         for ((limit, s), nu) in limits.iter().zip(&self.s[knot]).zip(&self.nu[knot]) {
             let left = limit.room(x, u) - s;
             let (weight, slope) = (nu / s, mu / s - nu / s * left);
-            let along = [(0, limit.position), (1, limit.speed), (force, limit.force)];
+            let along = [(0, limit.position), (1, limit.speed), (force, limit.input)];
             for (i, a) in along {
                 stage.q_linear[i] += slope * a;
                 for (j, b) in along {
@@ -103,7 +103,7 @@ impl Slacks {
             let (x, u) = (&knots.x[knot], knots.u[knot]);
             let (mut ds, mut dnu) = (Vec::new(), Vec::new());
             for ((limit, &s), &nu) in limits.iter().zip(&self.s[knot]).zip(&self.nu[knot]) {
-                let moved = limit.position * z[0] + limit.speed * z[1] + limit.force * z[z.len() - 1];
+                let moved = limit.position * z[0] + limit.speed * z[1] + limit.input * z[z.len() - 1];
                 let change = limit.room(x, u) - s - moved;
                 let change_nu = mu / s - nu - nu / s * change;
                 if change < 0.0 {

@@ -3,12 +3,15 @@
 use super::dynamics::Dynamics;
 use crate::number::rounded;
 use crate::numerics::Matrix;
+use crate::rig::CartInput;
 
 /// Bounds of a trajectory. Each holds at every knot.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bounds {
-    /// Largest force (N).
-    pub(super) force_n: f64,
+    /// What the drive imposes on the cart.
+    pub(super) kind: CartInput,
+    /// Largest force (N) or acceleration (m/s²).
+    pub(super) input: f64,
     /// Force of the motor at standstill (N) and its loss by back-EMF (N·s/m): `|u + loss ẋ| <= force`.
     pub(super) motor: Option<[f64; 2]>,
     /// Largest speed of the cart (m/s).
@@ -17,34 +20,34 @@ pub(super) struct Bounds {
     pub(super) rail_m: Option<[f64; 2]>,
 }
 
-/// One linear limit: `position x + speed ẋ + force u <= bound`.
+/// One linear limit: `position x + speed ẋ + input u <= bound`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlanLimit {
     pub(super) position: f64,
     pub(super) speed: f64,
-    pub(super) force: f64,
+    pub(super) input: f64,
     pub(super) bound: f64,
     /// Name of the limit for a user.
     pub(super) name: &'static str,
 }
 
 impl PlanLimit {
-    /// Distance of a state and a force from the limit; negative beyond it.
+    /// Distance of a state and an input from the limit; negative beyond it.
     pub(super) fn room(&self, x: &[f64], u: f64) -> f64 {
-        self.bound - self.position * x[0] - self.speed * x[1] - self.force * u
+        self.bound - self.position * x[0] - self.speed * x[1] - self.input * u
     }
 }
 
 impl Bounds {
     /// All bounds, each as one-sided limits.
     pub(super) fn limits(&self) -> Vec<PlanLimit> {
-        let free = PlanLimit { position: 0.0, speed: 0.0, force: 0.0, bound: 0.0, name: "" };
+        let free = PlanLimit { position: 0.0, speed: 0.0, input: 0.0, bound: 0.0, name: "" };
         let mut limits = Vec::new();
         for sign in [1.0, -1.0] {
-            limits.push(PlanLimit { force: sign, bound: self.force_n, name: "force", ..free });
+            limits.push(PlanLimit { input: sign, bound: self.input, name: self.kind.name(), ..free });
             if let Some([stall, loss]) = self.motor {
                 limits.push(PlanLimit {
-                    force: sign,
+                    input: sign,
                     speed: sign * loss,
                     bound: stall,
                     name: "motor voltage",
@@ -66,7 +69,8 @@ impl Bounds {
     #[must_use]
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
-            force_n: self.force_n * factor,
+            kind: self.kind,
+            input: self.input * factor,
             motor: self.motor.map(|[stall, loss]| [stall * factor, loss]),
             speed_m_per_s: self.speed_m_per_s.map(|speed| speed * factor),
             rail_m: self.rail_m.map(|ends| ends.map(|end| end * factor)),
@@ -85,11 +89,11 @@ pub(super) struct TrajectoryProblem<'a> {
     pub(super) limits: Vec<PlanLimit>,
     /// Cost per second: `xᵀ Q x + r_u u² + r_du u̇²`.
     pub(super) state_weights: Matrix<f64>,
-    pub(super) force_weight: f64,
+    pub(super) input_weight: f64,
     pub(super) rate_weight: f64,
 }
 
-/// States at the knots (steps + 1) and forces at the knots (steps + 1), linear between them.
+/// States at the knots (steps + 1) and inputs at the knots (steps + 1), linear between them.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Knots {
     pub(super) x: Vec<Vec<f64>>,

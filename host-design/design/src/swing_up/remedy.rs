@@ -10,19 +10,19 @@ const DIGITS: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RigLimit {
     Rail,
-    Force,
+    Input,
     Speed,
     Duration,
 }
 
 impl RigLimit {
-    pub(super) const ALL: [Self; 4] = [Self::Rail, Self::Force, Self::Speed, Self::Duration];
+    pub(super) const ALL: [Self; 4] = [Self::Rail, Self::Input, Self::Speed, Self::Duration];
 
     /// Name of the limit for a user.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Rail => "rail",
-            Self::Force => "force",
+            Self::Input => "force or acceleration",
             Self::Speed => "speed of the cart",
             Self::Duration => "duration",
         }
@@ -33,7 +33,7 @@ impl RigLimit {
     pub(super) fn relax(self, remedy: &mut Remedy, longest_s: f64, factor: f64) -> Option<()> {
         match self {
             Self::Rail => remedy.lengthen_rail(factor),
-            Self::Force => remedy.strengthen(factor),
+            Self::Input => remedy.strengthen(factor),
             Self::Speed => remedy.hasten(factor),
             Self::Duration => remedy.lengthen_time(factor * longest_s),
         }
@@ -78,18 +78,28 @@ impl Remedy {
         Some(())
     }
 
-    /// Allows `factor` times as much force in a plan: raises what `[swing_up]` allows, and strengthens the actuator if
-    /// it is too weak for that.
+    /// Allows `factor` times as much force or acceleration in a plan: raises what `[swing_up]` allows, and strengthens
+    /// the actuator if it is too weak for that.
     fn strengthen(&mut self, factor: f64) -> Option<()> {
-        let full = self.rig.force_limit_n()?;
+        let full = self.rig.input_limit()?;
         let rules = self.rig.swing_up.get_or_insert_default();
-        let wanted = rounded(factor * rules.force_n.map_or(full, |force| force.min(full)), DIGITS);
-        if let Some(force) = &mut rules.force_n {
-            *force = wanted;
-            self.keys.push(format!("swing_up.force_n = {wanted}"));
+        let wanted = rounded(factor * rules.input().map_or(full, |input| input.min(full)), DIGITS);
+        let planned = [
+            ("force_n", &mut rules.force_n),
+            ("acceleration_m_per_s2", &mut rules.acceleration_m_per_s2),
+        ];
+        for (key, largest) in planned {
+            if let Some(largest) = largest {
+                *largest = wanted;
+                self.keys.push(format!("swing_up.{key} = {wanted}"));
+            }
         }
         if wanted > full {
             let actuator = &mut self.rig.actuator;
+            if let Some(drive) = &mut actuator.acceleration {
+                drive.acceleration_limit_m_per_s2 = wanted;
+                self.keys.push(format!("actuator.acceleration_limit_m_per_s2 = {wanted}"));
+            }
             if let Some(limit) = &mut actuator.force_limit_n {
                 *limit = rounded(*limit * wanted / full, DIGITS);
                 self.keys.push(format!("actuator.force_limit_n = {limit}"));
@@ -108,6 +118,19 @@ impl Remedy {
         let speed = of_plan.or(self.rig.limits.speed_m_per_s.as_mut())?;
         *speed = rounded(factor * *speed, DIGITS);
         self.keys.push(format!("{section}.speed_m_per_s = {speed}"));
+        let drive = self.rig.actuator.acceleration.as_mut();
+        let limits = drive.into_iter().flat_map(|drive| {
+            [
+                ("speed_limit_m_per_s", &mut drive.speed_limit_m_per_s),
+                ("step_rate_limit_hz", &mut drive.step_rate_limit_hz),
+            ]
+        });
+        for (key, limit) in limits {
+            if let Some(limit) = limit {
+                *limit = rounded(factor * *limit, DIGITS);
+                self.keys.push(format!("actuator.{key} = {limit}"));
+            }
+        }
         Some(())
     }
 

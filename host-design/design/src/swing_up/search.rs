@@ -25,9 +25,9 @@ use crate::motion::{PlannedMotion, Transition};
 use crate::numerics::Matrix;
 use crate::parallel;
 
-/// Share of motor and speed that a plan uses, and the ranges for force and rail: what is left is for the feedback.
+/// Share of motor and speed that a plan uses, and the ranges for input and rail: what is left is for the feedback.
 const SHARE: f64 = 0.9;
-const FORCE_SHARE: [f64; 2] = [0.6, 0.9];
+const INPUT_SHARE: [f64; 2] = [0.6, 0.9];
 const RAIL_SHARE: [f64; 2] = [0.6, 0.9];
 /// Durations in units of √(L/g).
 const DURATION: [f64; 2] = [9.0, 20.0];
@@ -36,7 +36,7 @@ const LATE: u64 = 100;
 const STRETCH: f64 = 2.0;
 /// Weight of the links' rates, in units of L/g: the range of its logarithm to base 10.
 const RATE_WEIGHT: [f64; 2] = [-2.0, 0.5];
-/// A force that changes by its limit within this time costs as much as a force at its limit (s).
+/// An input that changes by its limit within this time costs as much as one at its limit (s).
 const RATE_TIME_S: f64 = 0.03;
 /// How far a refined path may exceed a bound of the plan, as a share of it.
 const EXCESS: f64 = 0.03;
@@ -53,7 +53,7 @@ struct Draw {
     bounds: Bounds,
     /// Weight of the rates (s²/rad²).
     rate_weight: f64,
-    /// Amplitudes of the harmonics in the force of the initial guess, as shares of its bound.
+    /// Amplitudes of the harmonics in the input of the initial guess, as shares of its bound.
     wobble: [f64; 3],
     /// Links that turn the other way round if the motion changes them: a bit for each.
     reversed: u32,
@@ -70,9 +70,9 @@ pub(super) struct MotionCandidate {
 /// Limits that the rig file sets for a plan.
 #[derive(Debug, Clone)]
 pub(super) struct SearchRanges {
-    /// Ranges from which duration, largest force and largest distance from the middle of the rail are drawn.
+    /// Ranges from which duration, largest input and largest distance from the middle of the rail are drawn.
     pub(super) duration_s: [f64; 2],
-    pub(super) force_n: [f64; 2],
+    pub(super) input: [f64; 2],
     pub(super) rail_m: [f64; 2],
     /// The bounds that are not drawn.
     pub(super) bounds: Bounds,
@@ -83,12 +83,15 @@ impl SearchRanges {
     pub(super) fn of(setting: &Setting<'_>) -> Self {
         let (unit, rules) = (time_unit(setting), &setting.rules);
         let mut bounds = setting.actuator.scaled(SHARE);
-        bounds.speed_m_per_s =
-            rules.speed_m_per_s.or(setting.rig.limits.speed_m_per_s.map(|speed| SHARE * speed));
-        let full = setting.actuator.force_n;
-        let force_n = match rules.force_n {
-            Some(force) => [force.min(full); 2],
-            None => FORCE_SHARE.map(|share| share * full),
+        let asked = rules.speed_m_per_s.or(setting.rig.limits.speed_m_per_s.map(|speed| SHARE * speed));
+        bounds.speed_m_per_s = match (asked, bounds.speed_m_per_s) {
+            (Some(asked), Some(drive)) => Some(asked.min(drive)),
+            (asked, drive) => asked.or(drive),
+        };
+        let full = setting.actuator.input;
+        let input = match rules.input() {
+            Some(largest) => [largest.min(full); 2],
+            None => INPUT_SHARE.map(|share| share * full),
         };
         let [low, high] = setting.chain.cart.travel_m;
         let farthest = high.min(-low);
@@ -99,7 +102,7 @@ impl SearchRanges {
         let [shortest, longest] = DURATION.map(|units| units * unit);
         let shortest = rules.shortest_s.unwrap_or_else(|| shortest.min(rules.longest_s.unwrap_or(shortest)));
         let duration_s = [shortest, rules.longest_s.unwrap_or(longest).max(shortest)];
-        Self { duration_s, force_n, rail_m, bounds, spread: MotionSpread::asked(setting.rig) }
+        Self { duration_s, input, rail_m, bounds, spread: MotionSpread::asked(setting.rig) }
     }
 }
 
@@ -118,10 +121,10 @@ fn draw(setting: &Setting<'_>, request: &SearchRanges, transition: Transition, n
     let [shortest, longest] = request.duration_s;
     let duration_s =
         between([shortest, if is_between && number >= LATE { STRETCH * longest } else { longest }]);
-    let (force_n, rail_m) = (between(request.force_n), between(request.rail_m));
+    let (input, rail_m) = (between(request.input), between(request.rail_m));
     let rate_weight = libm::exp10(between(RATE_WEIGHT)) * unit * unit;
     let wobble = core::array::from_fn(|_| if number == 0 { 0.0 } else { between([-0.05, 0.05]) });
-    let bounds = Bounds { force_n, rail_m: Some([-rail_m, rail_m]), ..request.bounds.clone() };
+    let bounds = Bounds { input, rail_m: Some([-rail_m, rail_m]), ..request.bounds.clone() };
     // The first candidate turns all links the same way, as in raising and lowering.
     let reversed =
         if is_between && number > 0 { random.random_range(0..1 << setting.chain.links.len()) } else { 0 };
@@ -156,15 +159,15 @@ fn solve(
         end,
         limits: draw.bounds.limits(),
         state_weights: rate_weights(setting, draw.rate_weight),
-        force_weight: setting.actuator.force_n.powi(-2),
-        rate_weight: (RATE_TIME_S / setting.actuator.force_n).powi(2),
+        input_weight: setting.actuator.input.powi(-2),
+        rate_weight: (RATE_TIME_S / setting.actuator.input).powi(2),
     };
     let knots = shooting::solve(&problem, guess(&problem, &draw))?.rounded();
     let path = refine(&*setting.dynamics, &knots, ticks, setting.tick_s, &ends)?;
     within(&path, &draw.bounds).then_some((knots, path))
 }
 
-/// Initial guess: all links turn at constant rates, and the force is the one drawn.
+/// Initial guess: all links turn at constant rates, and the input is the one drawn.
 fn guess(problem: &TrajectoryProblem<'_>, draw: &Draw) -> Knots {
     let (steps, turn) = (problem.steps, core::f64::consts::PI);
     let duration_s = steps as f64 * problem.knot_s;
@@ -180,7 +183,7 @@ fn guess(problem: &TrajectoryProblem<'_>, draw: &Draw) -> Knots {
         }
         let wave = |(harmonic, share): (usize, &f64)| share * libm::sin(turn * part * (harmonic + 1) as f64);
         knots.x.push(x);
-        knots.u.push(draw.bounds.force_n * draw.wobble.iter().enumerate().map(wave).sum::<f64>());
+        knots.u.push(draw.bounds.input * draw.wobble.iter().enumerate().map(wave).sum::<f64>());
     }
     knots
 }

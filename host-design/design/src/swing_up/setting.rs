@@ -18,7 +18,10 @@ use crate::verify::Disturbance;
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
 /// than at rest.
 const JOINT_NOISE: f64 = 100.0;
-const FORCE_NOISE: f64 = 10.0;
+/// The same where the drive imposes the cart's motion: a faster filter takes the spring of a step motor for motion of
+/// the links.
+const JOINT_NOISE_OF_STEPPER: f64 = 3.0;
+const INPUT_NOISE: f64 = 10.0;
 /// Time after which the filter at rest has settled (s).
 const SETTLE_S: f64 = 2.0;
 
@@ -36,7 +39,7 @@ pub(super) struct Setting<'a> {
     /// Travel per count of each sensor (m, rad).
     pub(super) steps: Vec<f64>,
     pub(super) weights: Matrix<f64>,
-    pub(super) force_weight: f64,
+    pub(super) input_weight: f64,
     rests: BTreeMap<Equilibrium, AtRest>,
 }
 
@@ -64,8 +67,8 @@ impl<'a> Setting<'a> {
         let (Some(lqr), Some(kalman)) = (&rig.lqr, &rig.kalman) else {
             return Err(SwingUpError::Needs("[lqr] and [kalman]"));
         };
-        let force_n =
-            rig.force_limit_n().ok_or(SwingUpError::Needs("force_limit_n in [actuator], or a motor"))?;
+        let input =
+            rig.input_limit().ok_or(SwingUpError::Needs("force_limit_n in [actuator], or a motor"))?;
         if rig.tick.delay_ticks != 0 {
             return Err(SwingUpError::Delay);
         }
@@ -74,16 +77,17 @@ impl<'a> Setting<'a> {
             return Err(SwingUpError::Needs("an encoder at every link"));
         }
         let (dynamics, tick_s) = (dynamics(chain)?, rig.tick.period_s);
+        let drive = rig.actuator.acceleration.as_ref();
         let steps: Vec<f64> = sensors.iter().map(|sensor| sensor.step()).collect();
         let rules = rig.swing_up.clone().unwrap_or_default();
         let rounding = |(sensor, step): (&Sensor, &f64)| (sensor.state, step * step / 12.0);
         let noise = noise(chain, kalman, &rules, sensors.iter().zip(&steps).map(rounding).collect());
         let weights = Matrix::from_f64_rows(&lqr.weights().0);
-        let (states, force_weight) = (rig.states(), lqr.force_weight);
+        let (states, input_weight) = (rig.states(), lqr.force_weight);
         let at_rest = |at: Equilibrium| -> Result<AtRest, SwingUpError> {
             let state = rest(at, states);
             let tick = tick(&*dynamics, &state, 0.0, tick_s);
-            let (cost, k) = stationary(&tick, &weights, force_weight, tick_s);
+            let (cost, k) = stationary(&tick, &weights, input_weight, tick_s);
             let mut filter = PathFilter::new(&*dynamics, &noise, states, tick_s);
             let l = filter.settle(&state, &tick, (SETTLE_S / tick_s) as usize)?;
             Ok(AtRest { cost, k, l, covariance: filter.covariance })
@@ -97,9 +101,10 @@ impl<'a> Setting<'a> {
         }
         Ok(Self {
             actuator: Bounds {
-                force_n,
+                kind: chain.input,
+                input,
                 motor: rig.actuator.motor.as_ref().map(motor),
-                speed_m_per_s: None,
+                speed_m_per_s: drive.and_then(|drive| drive.largest_speed_m_per_s(tick_s)),
                 rail_m: Some(chain.cart.travel_m),
             },
             disturbance: Disturbance::of(rig),
@@ -110,7 +115,7 @@ impl<'a> Setting<'a> {
             noise,
             steps,
             weights,
-            force_weight,
+            input_weight,
             rests,
             dynamics,
         })
@@ -132,11 +137,15 @@ impl<'a> Setting<'a> {
 fn noise(chain: &Chain, kalman: &KalmanNoise, rules: &SwingUpRules, sensors: Vec<(usize, f64)>) -> Noise {
     let wrong = rules.friction_spread_percent / 100.0;
     let of_links = chain.links.iter().map(|link| link.friction_n_m_s_per_rad);
-    let frictions = [chain.cart.friction_n_s_per_m].into_iter().chain(of_links);
-    let joints = kalman.joint_noise.iter().map(|intensity| JOINT_NOISE * intensity);
+    // A drive that imposes the cart's motion overcomes its friction.
+    let of_cart = if chain.input.is_force() { chain.cart.friction_n_s_per_m } else { 0.0 };
+    let frictions = [of_cart].into_iter().chain(of_links);
+    let more = if chain.input.is_force() { JOINT_NOISE } else { JOINT_NOISE_OF_STEPPER };
+    let joints = kalman.joint_noise.iter().map(|intensity| more * intensity);
     Noise {
         friction_errors: frictions.map(|friction| wrong * friction).collect(),
-        intensities: [FORCE_NOISE * kalman.force_noise_n2_s].into_iter().chain(joints).collect(),
+        knows_cart: !chain.input.is_force(),
+        intensities: [INPUT_NOISE * kalman.force_noise_n2_s].into_iter().chain(joints).collect(),
         sensors,
     }
 }

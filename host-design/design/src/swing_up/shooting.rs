@@ -197,7 +197,7 @@ fn stage_cost(
         Some(damping) => {
             q_linear[..s].copy_from_slice(&times(weights, x));
             q = q.with_block(0, 0, weights);
-            q[(s, s)] = 2.0 * h * problem.force_weight;
+            q[(s, s)] = 2.0 * h * problem.input_weight;
             q_linear[s] = q[(s, s)] * u;
             for i in 0..s {
                 q[(i, i)] += damping * h;
@@ -207,7 +207,7 @@ fn stage_cost(
             for i in 0..s {
                 q[(i, i)] = 1e-3 * h;
             }
-            q[(s, s)] = 2.0 * h * problem.force_weight;
+            q[(s, s)] = 2.0 * h * problem.input_weight;
         }
     }
     let (a, b, d) = (Matrix::zeros(0, 0), Vec::new(), Vec::new());
@@ -253,7 +253,7 @@ fn cost(problem: &TrajectoryProblem<'_>, at: &Iterate) -> f64 {
     for (knot, (x, &u)) in knots.x.iter().zip(&knots.u).enumerate() {
         let of_states: f64 =
             x.iter().zip(problem.state_weights.row_slices()).map(|(x_i, row)| x_i * dot(row, x)).sum();
-        sum += h * (of_states + problem.force_weight * u * u);
+        sum += h * (of_states + problem.input_weight * u * u);
         if let Some(next) = knots.u.get(knot + 1) {
             let rate = (next - u) / h;
             sum += h * problem.rate_weight * rate * rate;

@@ -52,14 +52,15 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
     let thresholds = &mut swing_up.thresholds;
     // Nobody pushes a rig that moves as planned.
     thresholds.push.fill(f32::MAX);
-    let of_cart = thresholds.innovation[0];
+    let of_motor = rig.actuator.input().motor_sensor();
+    let before = thresholds.innovation[of_motor];
     for (sensor, (innovation, moved)) in reached.innovation.iter().zip(&reached.moved).enumerate() {
         // The innovation from the rig's noise at rest adds to that from a wrong model in motion.
         let wider = 1.0 + (MARGIN * innovation) as f32 / thresholds.innovation[sensor];
         thresholds.innovation[sensor] *= wider;
         thresholds.frozen[sensor] = (thresholds.frozen[sensor] * wider).max((MARGIN * moved) as f32);
     }
-    thresholds.motor.energy *= (thresholds.innovation[0] / of_cart).powi(2);
+    thresholds.motor.energy *= (thresholds.innovation[of_motor] / before).powi(2);
     Ok(())
 }
 

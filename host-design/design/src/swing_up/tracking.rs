@@ -12,7 +12,7 @@ pub(super) fn ticks(dynamics: &dyn Dynamics, path: &Path, tick_s: f64) -> Vec<He
 
 /// `[Q S; Sᵀ R]` of one tick in state and held force: the integral of the continuous cost over the tick, by Simpson's
 /// rule, with the trajectory of the state to first order in the deviations. `weights` is diagonal.
-fn tick_cost(tick: &HeldTick, weights: &Matrix<f64>, force_weight: f64, tick_s: f64) -> Matrix<f64> {
+fn tick_cost(tick: &HeldTick, weights: &Matrix<f64>, input_weight: f64, tick_s: f64) -> Matrix<f64> {
     let s = tick.whole.rows();
     let over = |by: &Matrix<f64>| {
         Matrix::from_fn(s, s + 1, |k, i| weights[(k, k)] * by[(k, i)]).transposed_times(by)
@@ -22,7 +22,7 @@ fn tick_cost(tick: &HeldTick, weights: &Matrix<f64>, force_weight: f64, tick_s: 
     let mut cost = Matrix::from_fn(s + 1, s + 1, |i, j| {
         (start(i, j) + 4.0 * middle[(i, j)] + end[(i, j)]) * (tick_s / 6.0)
     });
-    cost[(s, s)] += tick_s * force_weight;
+    cost[(s, s)] += tick_s * input_weight;
     cost
 }
 
@@ -41,7 +41,7 @@ fn step_back(tick: &HeldTick, cost: &Matrix<f64>, ahead: &Matrix<f64>) -> (Matri
 pub(super) fn feedback(
     ticks: &[HeldTick],
     weights: &Matrix<f64>,
-    force_weight: f64,
+    input_weight: f64,
     at_end: &Matrix<f64>,
     tick_s: f64,
 ) -> Vec<Matrix<f64>> {
@@ -50,7 +50,7 @@ pub(super) fn feedback(
         .iter()
         .rev()
         .map(|tick| {
-            let (k, before) = step_back(tick, &tick_cost(tick, weights, force_weight, tick_s), &ahead);
+            let (k, before) = step_back(tick, &tick_cost(tick, weights, input_weight, tick_s), &ahead);
             ahead = before;
             k
         })
@@ -63,11 +63,11 @@ pub(super) fn feedback(
 pub(super) fn stationary(
     tick: &HeldTick,
     weights: &Matrix<f64>,
-    force_weight: f64,
+    input_weight: f64,
     tick_s: f64,
 ) -> (Matrix<f64>, Matrix<f64>) {
     const MOST: usize = 200_000;
-    let cost = tick_cost(tick, weights, force_weight, tick_s);
+    let cost = tick_cost(tick, weights, input_weight, tick_s);
     let (mut ahead, mut gain) = (weights.clone(), Matrix::zeros(1, tick.whole.rows()));
     for _ in 0..MOST {
         let (k, before) = step_back(tick, &cost, &ahead);
@@ -92,6 +92,9 @@ pub(super) struct Noise {
     pub(super) friction_errors: Vec<f64>,
     /// State that each sensor measures, and the variance of its rounding.
     pub(super) sensors: Vec<(usize, f64)>,
+    /// Whether the drive knows position and speed of the cart, to the rounding of the first sensor: then no sensor
+    /// corrects them.
+    pub(super) knows_cart: bool,
 }
 
 impl Noise {
@@ -119,6 +122,9 @@ impl<'a> PathFilter<'a> {
         for &(state, variance) in &noise.sensors {
             covariance[(state, state)] = variance;
         }
+        if noise.knows_cart {
+            (covariance[(0, 0)], covariance[(1, 1)]) = (0.0, 0.0);
+        }
         Self { dynamics, noise, tick_s, covariance }
     }
 
@@ -127,7 +133,7 @@ impl<'a> PathFilter<'a> {
     /// # Errors
     /// [`Singular`] if the covariance of the innovation is singular.
     pub(super) fn gain(&mut self, x: &[f64], tick: &HeldTick) -> Result<Matrix<f64>, Singular> {
-        self.gain_over(&self.spread(x), &tick.a())
+        self.gain_over(&self.disturbances(x), &tick.a())
     }
 
     /// Repeats the tick at a state of rest until the filter has settled.
@@ -140,29 +146,48 @@ impl<'a> PathFilter<'a> {
         tick: &HeldTick,
         ticks: usize,
     ) -> Result<Matrix<f64>, Singular> {
-        let (spread, a) = (self.spread(x), tick.a());
-        let mut l = self.gain_over(&spread, &a)?;
+        let (disturbances, a) = (self.disturbances(x), tick.a());
+        let mut l = self.gain_over(&disturbances, &a)?;
         for _ in 1..ticks {
-            l = self.gain_over(&spread, &a)?;
+            l = self.gain_over(&disturbances, &a)?;
         }
         Ok(l)
     }
 
-    /// Covariance that noise in half a tick adds near `x`.
-    fn spread(&self, x: &[f64]) -> Matrix<f64> {
-        let b = self.dynamics.inputs(x);
-        let spread = &(&b * &Matrix::from_diagonal(&self.noise.at(x))) * &b.transpose();
-        spread.scaled(&(0.5 * self.tick_s))
+    /// Covariances near `x`: what noise in half a tick adds to the state, and what rounding adds to the sensors.
+    ///
+    /// A drive that knows the cart moves it by whole steps, and the links swing with what is rounded: each by its
+    /// acceleration per acceleration of the cart, times the cart's distance.
+    fn disturbances(&self, x: &[f64]) -> [Matrix<f64>; 2] {
+        let (noise, mut b) = (self.noise, self.dynamics.inputs(x));
+        let sensors = &noise.sensors;
+        let mut rounding =
+            Matrix::from_diagonal(&sensors.iter().map(|&(_, variance)| variance).collect::<Vec<_>>());
+        if noise.knows_cart {
+            let of_cart = rounding[(0, 0)];
+            let per_metre = |sensor: usize| b[(sensors[sensor].0 + 1, 0)];
+            for i in 1..sensors.len() {
+                for j in 1..sensors.len() {
+                    rounding[(i, j)] += per_metre(i) * per_metre(j) * of_cart;
+                }
+            }
+            b.row_mut(1).fill(0.0);
+        }
+        let spread = &(&b * &Matrix::from_diagonal(&noise.at(x))) * &b.transpose();
+        [spread.scaled(&(0.5 * self.tick_s)), rounding]
     }
 
-    /// As [`gain`](Self::gain), for a tick with these noise and derivatives.
-    fn gain_over(&mut self, spread: &Matrix<f64>, a: &Matrix<f64>) -> Result<Matrix<f64>, Singular> {
+    /// As [`gain`](Self::gain), for a tick with these [`disturbances`](Self::disturbances) and derivatives.
+    fn gain_over(
+        &mut self,
+        [spread, rounding]: &[Matrix<f64>; 2],
+        a: &Matrix<f64>,
+    ) -> Result<Matrix<f64>, Singular> {
         let (p, sensors) = (&self.covariance, &self.noise.sensors);
         let (s, count) = (p.rows(), sensors.len());
         let to_sensors = Matrix::from_fn(s, count, |i, j| p[(i, sensors[j].0)]);
-        let innovation = Matrix::from_fn(count, count, |i, j| {
-            p[(sensors[i].0, sensors[j].0)] + if i == j { sensors[i].1 } else { 0.0 }
-        });
+        let innovation =
+            Matrix::from_fn(count, count, |i, j| p[(sensors[i].0, sensors[j].0)] + rounding[(i, j)]);
         let l = solve_right(&to_sensors, &innovation)?;
         let corrected = (p - &(&l * &to_sensors.transpose())).symmetric_part();
         // Trapezoidal rule: noise from the start of the tick goes through it, noise from its end does not.

@@ -18,8 +18,8 @@ const RUNS: usize = 100;
 pub struct SolvedCandidate {
     /// Duration (s).
     pub duration_s: f64,
-    /// Largest force (N).
-    pub force_n: f64,
+    /// Largest force (N) or acceleration (m/s²).
+    pub input: f64,
     /// Largest distance of the cart from the middle (m).
     pub position_m: f64,
     /// Fragility: the smaller, the larger errors of masses and friction it survives.
@@ -58,7 +58,7 @@ pub fn solved(
         step(Some(score));
         Ok(SolvedCandidate {
             duration_s: motion.duration_s(),
-            force_n: motion.u.iter().copied().fold(0.0, largest),
+            input: motion.u.iter().copied().fold(0.0, largest),
             position_m: motion.x.iter().map(|x| x[0]).fold(0.0, largest),
             score,
             runs,

@@ -1,6 +1,7 @@
 //! Margins along the motions of a swing-up, and the candidates of its search.
 
 use upright_design::motion::Transition;
+use upright_design::rig::CartInput;
 use upright_design::swing_up::{Margin, RandomRuns, SolvedCandidate};
 
 use super::{Axis, Curve, Figure, Panel};
@@ -25,9 +26,9 @@ pub fn margins_figure(title: &str, motions: &[(Transition, Vec<Margin>)]) -> Fig
     panels.fold(Figure::new(title), Figure::with)
 }
 
-/// Largest force, use of the rail, random runs that arrive, and fragility over the duration, a point for each
+/// Largest force or acceleration, use of the rail, random runs that arrive, and fragility over the duration, a point for each
 /// candidate.
-pub fn trade_figure(title: &str, solved: &[SolvedCandidate]) -> Figure {
+pub fn trade_figure(title: &str, solved: &[SolvedCandidate], input: CartInput) -> Figure {
     let durations = solved.iter().map(|one| one.duration_s);
     let (shortest, longest) =
         (durations.clone().fold(f64::INFINITY, f64::min), durations.fold(0.0, f64::max));
@@ -52,7 +53,7 @@ pub fn trade_figure(title: &str, solved: &[SolvedCandidate]) -> Figure {
             .with(Curve::markers("fewer", 0, points(false)))
     };
     Figure::new(title)
-        .with(panel(Axis::linear("largest force (N)"), |one| one.force_n))
+        .with(panel(Axis::linear(format!("largest {} ({})", input.name(), input.unit())), |one| one.input))
         .with(panel(Axis::linear("farthest (m)"), |one| one.position_m))
         .with(
             Panel::new(duration(), Axis::linear("runs that arrive (%)").range(-5.0, 105.0))

@@ -87,6 +87,11 @@ impl CartInput {
         usize::from(!self.is_force())
     }
 
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        if self.is_force() { "force" } else { "acceleration" }
+    }
+
     /// Its unit.
     pub fn unit(&self) -> &'static str {
         if self.is_force() { "N" } else { "m/s²" }
@@ -106,15 +111,28 @@ impl Table<'_> {
         force: &str,
         acceleration: &str,
     ) -> Result<f64, RigError> {
+        self.refuse_other_input(input, force, acceleration)?;
+        self.value(if input.is_force() { force } else { acceleration })
+    }
+
+    /// Refuses the key, of these two, that does not belong to `input`.
+    pub(super) fn refuse_other_input(
+        &self,
+        input: CartInput,
+        force: &str,
+        acceleration: &str,
+    ) -> Result<(), RigError> {
         let ([wanted, other], kind) = match input {
             CartInput::Force => ([force, acceleration], "acceleration"),
             CartInput::Acceleration => ([acceleration, force], "force"),
         };
-        if let Some(node) = self.get(other) {
-            let accepts = format!("only with kind = \"{kind}\" in [actuator]");
-            return Err(node.out_of_range(&accepts, &format!("give {wanted} instead, or change kind")));
+        match self.get(other) {
+            Some(node) => Err(node.out_of_range(
+                &format!("only with kind = \"{kind}\" in [actuator]"),
+                &format!("give {wanted} instead, or change kind"),
+            )),
+            None => Ok(()),
         }
-        self.value(wanted)
     }
 
     /// Refuses keys that a drive that imposes the cart's acceleration has no use for.

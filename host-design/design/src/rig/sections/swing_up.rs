@@ -5,6 +5,7 @@ use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
+use super::chain::CartInput;
 
 /// `[swing_up]`
 pub(crate) static SWING_UP: Section = Section {
@@ -28,8 +29,13 @@ keys! {
             "longest duration of a motion that is tried", Absent::Follows("20 √(L/g)");
         force_n: Option<f64>, "N", Rule::POSITIVE,
             "largest force of a plan", Absent::Follows("60 to 90 % of the largest force");
+        #[serde(skip_serializing_if = "Option::is_none")]
+        acceleration_m_per_s2: Option<f64>, "m/s²", Rule::POSITIVE,
+            "with kind = \"acceleration\": largest acceleration of a plan",
+            Absent::Follows("60 to 90 % of the drive's limit");
         speed_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
-            "largest speed of the cart in a plan", Absent::Follows("90 % of speed_m_per_s in [limits]");
+            "largest speed of the cart in a plan",
+            Absent::Follows("90 % of speed_m_per_s in [limits], and of what the drive can");
         rail_m: Option<f64>, "m", Rule::POSITIVE,
             "largest distance of the cart from the middle in a plan", Absent::Follows("60 to 90 % of travel_m");
         mass_spread_percent: f64, "%", Rule::PERCENT,
@@ -48,10 +54,18 @@ impl Default for SwingUpRules {
     }
 }
 
-/// Reads `[swing_up]`.
-pub(crate) fn swing_up(node: &Node<'_>) -> Result<SwingUpRules, RigError> {
+impl SwingUpRules {
+    /// Largest input of a plan (N, or m/s²), where given.
+    pub(crate) fn input(&self) -> Option<f64> {
+        self.force_n.or(self.acceleration_m_per_s2)
+    }
+}
+
+/// Reads `[swing_up]` of a rig whose drive imposes `input`.
+pub(crate) fn swing_up(node: &Node<'_>, input: CartInput) -> Result<SwingUpRules, RigError> {
     let table = node.table(&SWING_UP)?;
     let rules = SwingUpRules::read(&table)?;
+    table.refuse_other_input(input, "force_n", "acceleration_m_per_s2")?;
     match (rules.shortest_s, rules.longest_s, table.get("longest_s")) {
         (Some(shortest), Some(longest), Some(node)) if longest < shortest => {
             Err(node.out_of_range(DURATION.accepts, "give a longest_s of at least shortest_s"))

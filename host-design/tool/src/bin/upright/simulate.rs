@@ -146,7 +146,6 @@ impl SimulateCommand {
     /// The rig, and its table with the stored motions.
     pub(crate) fn with_motions(&self) -> Result<(Rig, TableValues), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        rig.refuse_acceleration("simulate --swing-up")?;
         let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
         Ok((rig, table))
     }

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 use upright_design::motion::Transition;
-use upright_design::rig::Rig;
+use upright_design::rig::{CartInput, Rig};
 use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::swing_up::{
@@ -126,9 +126,10 @@ impl SwingUpCommand {
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::of(&rig.name, source);
         let solved = with_progress(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
-        self.draw(&trade_figure(&format!("{}: candidates of a raising", rig.name), &solved))?;
+        let (title, input) = (format!("{}: candidates of a raising", rig.name), rig.actuator.input());
+        self.draw(&trade_figure(&title, &solved, input))?;
         let object = json!({ "rig": rig.name, "tried": TRADED, "solved": solved });
-        print(self.json, &object, || traded_text(&solved))
+        print(self.json, &object, || traded_text(&solved, input))
     }
 
     /// Writes a figure as --svg and --csv say.
@@ -144,7 +145,6 @@ impl SwingUpCommand {
 
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("swing-up")?;
         let failed = |source: SwingUpError| Failure::of(&rig.name, source);
         if self.table {
             // The outcome depends on the motions as well as on the rig file.
@@ -222,12 +222,15 @@ pub(crate) fn with_margins(
 }
 
 /// Duration, force and robustness of each candidate.
-fn traded_text(solved: &[SolvedCandidate]) -> String {
-    let head = "duration (s)  force (N)  farthest (m)  fragility     arrive  with twice the errors";
-    let line = |SolvedCandidate { duration_s, force_n, position_m, score, runs, wider }: &SolvedCandidate| {
+fn traded_text(solved: &[SolvedCandidate], input: CartInput) -> String {
+    let largest = format!("{} ({})", input.name(), input.unit());
+    let width = largest.len() + 1;
+    let head =
+        format!("duration (s)  {largest}  farthest (m)  fragility     arrive  with twice the errors");
+    let line = |SolvedCandidate { duration_s, input, position_m, score, runs, wider }: &SolvedCandidate| {
         let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
         format!(
-            "{duration_s:>12.2} {force_n:>10.2} {position_m:>13.3} {score:>10.2} {arrive:>10} {twice:>22}\n"
+            "{duration_s:>12.2} {input:>width$.2} {position_m:>13.3} {score:>10.2} {arrive:>10} {twice:>22}\n"
         )
     };
     format!("{} of {TRADED} candidates are solved\n{head}\n", solved.len())
@@ -277,7 +280,7 @@ fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failu
 }
 
 fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
-    let mut text = format!("{}\n", rig.name);
+    let (mut text, input) = (format!("{}\n", rig.name), rig.actuator.input());
     for MotionJudgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
         let percent = runs.interval.map(|end| 100.0 * end);
         // Writing into a string cannot fail.
@@ -288,7 +291,7 @@ fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
         let _ = write!(
             text,
             "  duration                  {:>10.3} s\n  \
-               largest force             {:>10.2} N\n  \
+               {:<25} {:>10.2} {}\n  \
                farthest from the middle  {:>10.3} m\n  \
                largest speed of the cart {:>10.2} m/s\n  \
                largest rate of a joint   {:>10.1} rad/s\n  \
@@ -298,7 +301,9 @@ fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
                random runs that arrive   {:>10} of {} (95 % interval {:.1} to {:.1} %)\n  \
                largest deviation         {:>10.3} rad\n",
             peaks.duration_s,
-            peaks.force_n,
+            format!("largest {}", input.name()),
+            peaks.input,
+            input.unit(),
             peaks.position_m,
             peaks.speed_m_per_s,
             peaks.rate_rad_per_s,

@@ -63,7 +63,6 @@ fn numbers(text: &str) -> Result<(u64, u64), String> {
 impl TransitionsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("transitions")?;
         let links = rig.links();
         let swing_up = Stored::beside(&self.rig)
             .and_then(|stored| motions(&rig, &stored))
@@ -230,10 +229,12 @@ fn text(
     transitions: &[(Transition, PlannedMotion)],
     runs: &[TransitionRuns],
 ) -> String {
-    let links = rig.links();
+    let (links, input) = (rig.links(), rig.actuator.input());
     let mut text = format!("{}, one motion after the other\n", rig.name);
+    let largest = format!("{} ({})", input.name(), input.unit());
+    let width = largest.len() + 2;
     // Writing into a string cannot fail.
-    let _ = writeln!(text, "motion      duration (s)  force (N)  farthest (m)     arrive  95 % interval (%)");
+    let _ = writeln!(text, "motion      duration (s)  {largest}  farthest (m)     arrive  95 % interval (%)");
     for TransitionRuns { transition, tried, arrived, interval } in runs {
         let motion = match transition {
             Transition::Up => Some(&swing_up.raise),
@@ -242,13 +243,13 @@ fn text(
                 transitions.iter().find(|(planned, _)| planned == transition).map(|(_, motion)| motion)
             }
         };
-        let [duration_s, force_n, position_m] =
-            motion.map_or([0.0; 3], |motion| [motion.duration_s(), motion.force_n(), motion.position_m()]);
+        let [duration_s, largest, position_m] =
+            motion.map_or([0.0; 3], |motion| [motion.duration_s(), motion.input(), motion.position_m()]);
         let [low, high] = interval.map(|end| 100.0 * end);
         let arrive = format!("{arrived} of {tried}");
         let _ = writeln!(
             text,
-            "{:<11} {duration_s:>12.2} {force_n:>10.1} {position_m:>13.3} {arrive:>10}  {low:.1} to {high:.1}",
+            "{:<11} {duration_s:>12.2} {largest:>width$.1} {position_m:>13.3} {arrive:>10}  {low:.1} to {high:.1}",
             transition.name(links)
         );
     }
