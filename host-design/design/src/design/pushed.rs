@@ -1,5 +1,7 @@
 //! The innovation of a rig that is pushed by hand.
 
+use upright::supervision::finding::IN_A_ROW;
+
 use super::zero_order_hold::zero_order_hold;
 use super::{Design, Feedback, Kalman, continuous_plant};
 use crate::numerics::Matrix;
@@ -22,8 +24,14 @@ const POWERS: usize = 40;
 /// half of a link, that one of the laws survives in the linear loop with its limited force. None for a model,
 /// for another drive than a force, and without a law or a limit.
 ///
-/// How hard they are follows from the laws; the error of the prediction then follows from the push alone.
-pub(super) fn pushed(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>) -> Option<Vec<f64>> {
+/// How hard they are follows from the laws; the error of the prediction then follows from the push, and from the
+/// firmware, which rejects measurements of the cart whose innovation grows by more than `healthy` (m) in a tick.
+pub(super) fn pushed(
+    rig: &Rig,
+    design: &Design<f64>,
+    kalman: &Kalman<f64>,
+    healthy: f64,
+) -> Option<Vec<f64>> {
     let (chain, limit) = (rig.chain()?, rig.input_limit()?);
     if !rig.actuator.input().is_force() {
         return None;
@@ -43,9 +51,8 @@ pub(super) fn pushed(rig: &Rig, design: &Design<f64>, kalman: &Kalman<f64>) -> O
             for duration_s in DURATIONS_S {
                 let lasts = ticks(rig, duration_s);
                 force_n = hardest(force_n, |force_n| pushed_loop.survives(law, &push, lasts, force_n));
-                for (sensor, most) in largest.iter_mut().enumerate() {
-                    *most = most.max(force_n * push.reaches(sensor, lasts));
-                }
+                let reached = pushed_loop.reached(kalman, &push, lasts, force_n, healthy);
+                largest = largest.iter().zip(reached).map(|(most, e)| most.max(e)).collect();
             }
         }
     }
@@ -101,8 +108,8 @@ fn hardest(mut force_n: f64, is_survived: impl Fn(f64) -> bool) -> f64 {
 struct UnitPush {
     /// Change of the state in a tick.
     held: Vec<f64>,
-    /// Innovation of each sensor (m or rad), and error of the corrected estimate, in each tick.
-    response: Vec<[Vec<f64>; 2]>,
+    /// Error of the corrected estimate in each tick.
+    response: Vec<Vec<f64>>,
 }
 
 impl UnitPush {
@@ -114,16 +121,9 @@ impl UnitPush {
             let seen: Vec<f64> = sensors.iter().map(|sensor| error[(sensor.state, 0)]).collect();
             let corrected = &error - &(&kalman.l_filter * &Matrix::column(&seen));
             error = &(&pushed_loop.design.ad * &corrected) + held;
-            [seen, corrected.entries().to_vec()]
+            corrected.entries().to_vec()
         });
         Self { response: response.collect(), held: held.entries().to_vec() }
-    }
-
-    /// Largest innovation of this sensor after a push of 1 N for `lasts` ticks (m or rad).
-    fn reaches(&self, sensor: usize, lasts: usize) -> f64 {
-        let seen = |tick: usize| self.response[tick][0][sensor];
-        let after = |tick: usize| seen(tick) - tick.checked_sub(lasts).map_or(0.0, seen);
-        (0..self.response.len()).map(|tick| after(tick).abs()).fold(0.0, f64::max)
     }
 }
 
@@ -175,8 +175,8 @@ impl PushedLoop<'_> {
             let since_end = tick.checked_sub(lasts);
             let estimate: Vec<f64> = (state.iter().enumerate())
                 .map(|(i, x)| {
-                    let after = since_end.map_or(0.0, |since| push.response[since][1][i]);
-                    x - force_n * (push.response[tick][1][i] - after)
+                    let after = since_end.map_or(0.0, |since| push.response[since][i]);
+                    x - force_n * (push.response[tick][i] - after)
                 })
                 .collect();
             let of_pending = if is_late { law.k.row(0)[estimate.len()] * pending } else { 0.0 };
@@ -192,5 +192,45 @@ impl PushedLoop<'_> {
                 .collect();
             self.limits.allow(&state)
         })
+    }
+
+    /// Largest innovation of each sensor (m or rad) in three ticks in a row, after a push with this force for `lasts`
+    /// ticks. As in the firmware, two measurements of the cart in a row are rejected whose innovations grow by more
+    /// than `healthy` (m) beyond the last accepted one. Those of the links are not rejected here: with limits that
+    /// allow for this, too, a dead motor of the quadruple is found too late.
+    fn reached(
+        &self,
+        kalman: &Kalman<f64>,
+        push: &UnitPush,
+        lasts: usize,
+        force_n: f64,
+        healthy: f64,
+    ) -> Vec<f64> {
+        let sensors = self.rig.sensors();
+        let held = Matrix::column(&push.held).scaled(&force_n);
+        let mut error = Matrix::zeros(held.rows(), 1);
+        let mut largest = vec![0.0f64; sensors.len()];
+        let mut last = vec![[0.0f64; IN_A_ROW as usize]; sensors.len()];
+        let (mut accepted, mut rejected) = (0.0f64, 0);
+        for tick in 0..push.response.len() {
+            let mut seen: Vec<f64> = sensors.iter().map(|sensor| error[(sensor.state, 0)]).collect();
+            for ((most, last), e) in largest.iter_mut().zip(&mut last).zip(&seen) {
+                last[tick % last.len()] = e.abs();
+                *most = most.max(last.iter().copied().fold(f64::INFINITY, f64::min));
+            }
+            let plausible = accepted.min(0.0) - healthy..=accepted.max(0.0) + healthy;
+            if plausible.contains(&seen[0]) || rejected + 1 == IN_A_ROW {
+                (accepted, rejected) = (seen[0], 0);
+            } else {
+                seen[0] = 0.0;
+                rejected += 1;
+            }
+            let corrected = &error - &(&kalman.l_filter * &Matrix::column(&seen));
+            error = &self.design.ad * &corrected;
+            if tick < lasts {
+                error = &error + &held;
+            }
+        }
+        largest
     }
 }

@@ -71,7 +71,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
     let innovation: Vec<f64> = (variances.iter().zip(steps).zip(&tolerated.innovation))
         .map(|((s, step), bound)| tolerated.mismatch * wider * (g * s.sqrt() + bound) + 0.5 * step)
         .collect();
-    let by_hand = pushed(rig, design, kalman).unwrap_or_default();
+    let by_hand = pushed(rig, design, kalman, innovation[0]).unwrap_or_default();
     let push = by_hand.iter().zip(&innovation).map(|(by_hand, healthy)| healthy + by_hand).collect();
     let rounding = rounding_variances(rig, steps);
     let sensor = rig.actuator.input().motor_sensor();

@@ -64,8 +64,8 @@ static inline bool upright_lacks_force(upright_controller *c)
     upright_add(&c->sums, 0.9375f, e, p);          /* a memory of 16 ticks */
     upright_add(&c->long_sums, 0.99609375f, e, p); /* a memory of 256 ticks */
     bool dead = upright_lacks(&c->long_sums, upright_table.motor_ratio, 16.0f * energy);
-    bool stuck = upright_lacks(&c->sums, 1.5f, energy) && !upright_lacks(&c->sums, 3.0f, energy);
-    return (dead && upright_explains(&c->long_sums, 0.97f)) || (stuck && upright_explains(&c->sums, 0.95f));
+    bool stuck = upright_lacks(&c->sums, 1.8125f, energy) && !upright_lacks(&c->sums, 3.0f, energy);
+    return (dead && upright_explains(&c->long_sums, 0.985f)) || (stuck && upright_explains(&c->sums, 0.95f));
 }
 
 /* Tests the innovation: do encoders and motor behave as the model says? That of a rejected measurement is set to 0, so
