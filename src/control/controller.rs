@@ -316,12 +316,12 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         y: &[T; NY],
         judge: impl FnOnce(&[i32; NY], &[T; NY], &mut [T; NY]),
     ) -> T {
-        self.state.govern(self.target, self.active.gains.setpoint_step);
         let estimate = &mut self.estimate.data.0[0];
-        let mut sum = FeedbackSum::new(self.active.gains.n, self.state.setpoint);
         let e = &mut self.innovation.data.0[0];
         *e = observer.innovation(y, estimate);
         judge(self.encoders.counts(), y, e);
+        self.state.govern(self.target, self.active.gains.setpoint_step);
+        let mut sum = FeedbackSum::new(self.active.gains.n, self.state.setpoint);
         observer.correct(e, estimate, |joint, x| {
             if let Some(k) = self.active.gains.k.as_slice().chunks(2).nth(joint) {
                 sum.feed_back(k, x);

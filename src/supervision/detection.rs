@@ -148,20 +148,20 @@ impl<const NY: usize> Detection<NY> {
         e: &mut [f32; NY],
     ) -> Option<Finding> {
         self.may_be_pushed = thresholds.survives_pushes();
-        let found = if self.may_be_pushed {
-            self.pushes.test(thresholds, counts, e)
-        } else {
-            PushFindings { encoder: self.test_sensors(thresholds, counts, y, e), push: None }
-        };
         // The innovation of a rejected measurement is 0: it says nothing about the motor.
-        // With constant indices, the processor has no bound to check.
-        let e_motor = if self.motor_sensor == 0 { e.first() } else { e.get(1) };
-        self.motor_error = e_motor.copied().unwrap_or_default();
-        let lacks_force = if self.may_be_pushed {
-            self.lacks_force
+        let (found, lacks_force) = if self.may_be_pushed {
+            let found = self.pushes.test(thresholds, counts, e);
+            // Pushes are for force drives, whose motor the cart shows.
+            self.motor_error = e.first().copied().unwrap_or_default();
+            (found, self.lacks_force)
         } else {
+            let encoder = self.test_sensors(thresholds, counts, y, e);
+            // With constant indices, the processor has no bound to check.
+            let e_motor = if self.motor_sensor == 0 { e.first() } else { e.get(1) };
+            self.motor_error = e_motor.copied().unwrap_or_default();
             self.sums.add(KEEP, self.motor_error, self.missing[0]);
-            self.sums.lacks(thresholds.motor.ratio, thresholds.motor.energy)
+            let lacks_force = self.sums.lacks(thresholds.motor.ratio, thresholds.motor.energy);
+            (PushFindings { encoder, push: None }, lacks_force)
         };
         let motor = lacks_force.then_some(Finding { fault: Fault::Motor, sensor: self.motor_sensor });
         found.encoder.or(motor).or(found.push)

@@ -84,10 +84,8 @@ impl Remedy {
         let full = self.rig.input_limit()?;
         let rules = self.rig.swing_up.get_or_insert_default();
         let wanted = rounded(factor * rules.input().map_or(full, |input| input.min(full)), DIGITS);
-        let planned = [
-            ("force_n", &mut rules.force_n),
-            ("acceleration_m_per_s2", &mut rules.acceleration_m_per_s2),
-        ];
+        let planned =
+            [("force_n", &mut rules.force_n), ("acceleration_m_per_s2", &mut rules.acceleration_m_per_s2)];
         for (key, largest) in planned {
             if let Some(largest) = largest {
                 *largest = wanted;

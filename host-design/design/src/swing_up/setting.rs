@@ -18,9 +18,11 @@ use crate::verify::Disturbance;
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
 /// than at rest.
 const JOINT_NOISE: f64 = 100.0;
-/// The same where the drive imposes the cart's motion: a faster filter takes the spring of a step motor for motion of
-/// the links.
-const JOINT_NOISE_OF_STEPPER: f64 = 3.0;
+/// The same for a long chain on a stepper: its loop is so fast that a faster filter takes the spring of the motor for
+/// motion of the links.
+const JOINT_NOISE_ON_STEPPER: f64 = 3.0;
+/// Least number of links of such a chain.
+const LONG_ON_STEPPER: usize = 3;
 const INPUT_NOISE: f64 = 10.0;
 /// Time after which the filter at rest has settled (s).
 const SETTLE_S: f64 = 2.0;
@@ -140,7 +142,8 @@ fn noise(chain: &Chain, kalman: &KalmanNoise, rules: &SwingUpRules, sensors: Vec
     // A drive that imposes the cart's motion overcomes its friction.
     let of_cart = if chain.input.is_force() { chain.cart.friction_n_s_per_m } else { 0.0 };
     let frictions = [of_cart].into_iter().chain(of_links);
-    let more = if chain.input.is_force() { JOINT_NOISE } else { JOINT_NOISE_OF_STEPPER };
+    let is_slow = chain.input.is_force() || chain.links.len() < LONG_ON_STEPPER;
+    let more = if is_slow { JOINT_NOISE } else { JOINT_NOISE_ON_STEPPER };
     let joints = kalman.joint_noise.iter().map(|intensity| more * intensity);
     Noise {
         friction_errors: frictions.map(|friction| wrong * friction).collect(),

@@ -250,11 +250,18 @@ fn keys_of_a_force_are_refused_with_what_to_do() {
     refused("[limits]\n", "[friction]\ncart_n = 1\n[limits]\n", &["friction.cart_n"]);
     refused("[limits]\n", "[verify]\nlatency_s = 1e-4\n[limits]\n", &["verify.latency_s"]);
     refused("[limits]\n", "[verify]\ncart_friction_n = 1\n[limits]\n", &["verify.cart_friction_n"]);
+    let [key, other] = ["swing_up.force_n", "give acceleration_m_per_s2 instead"];
+    refused("longest_s = 8", "force_n = 1", &[key, other]);
     // And the other way round.
     let force = std::fs::read_to_string(crate::published::rig_path("quadruple-paper")).unwrap();
     let other = |from: &str, to: &str| {
         Rig::from_toml(&force.replace(from, to), Path::new("rig.toml")).unwrap_err().to_string()
     };
     assert!(other("force_weight = 1", "acceleration_weight = 1").contains("give force_weight instead"));
+    let plan = other("[swing_up]\n", "[swing_up]\nacceleration_m_per_s2 = 1\n");
+    assert!(
+        plan.contains("swing_up.acceleration_m_per_s2") && plan.contains("give force_n instead"),
+        "{plan}"
+    );
     assert!(other("mass_kg = 0.1\nfriction_n_s", "friction_n_s").contains("cart.mass_kg: missing"));
 }

@@ -5,7 +5,7 @@ use upright_design::motion::RaiseAndLower;
 use upright_design::numerics::Matrix;
 use upright_design::rig::Rig;
 use upright_design::swing_up::{
-    Script, SolvedCandidate, Stored, SwingUpError, judge, motions, solved, with_motions,
+    Script, SolvedCandidate, Stored, SwingUpError, judge, motions, refined, solved, with_motions,
 };
 use upright_design::table::TableValues;
 
@@ -36,6 +36,30 @@ fn every_stored_motion_obeys_the_equations_and_the_limits_and_arrives() {
             assert!(arrives(rig, table, seed, false), "{name}, seed {seed}");
         }
         assert!(arrives(rig, table, 3, true), "{name} with wrong masses and friction");
+    }
+}
+
+/// A stepper's motion is one of the cart. No sensor corrects where the cart is, and a slower drive cannot follow.
+#[test]
+fn steppers_raise_and_lower_themselves_unless_the_drive_is_too_slow() {
+    for name in ["single-stepper", "double-stepper", "quadruple-stepper"] {
+        let (rig, table) = rig_and_table_with_motions(name);
+        for (seed, is_wrong) in [(1, false), (2, true), (3, true)] {
+            assert!(arrives(rig, table, seed, is_wrong), "{name}, seed {seed}");
+        }
+        let RaiseAndLower { raise, lower } = stored_motions(name);
+        for l in raise.l.iter().chain(&lower.l) {
+            let of_cart = |sensor| [l[(0, sensor)], l[(1, sensor)], l[(2, 0)]];
+            assert!(
+                (0..l.cols()).all(|sensor| of_cart(sensor) == [0.0; 3]) && l[(2, 1)] > 0.0,
+                "{name}: {l:?}"
+            );
+        }
+        let mut slow = rig.clone();
+        let drive = slow.actuator.acceleration.as_mut().unwrap();
+        drive.speed_limit_m_per_s = Some(0.5 * drive.speed_limit_m_per_s.unwrap());
+        let error = refined(&slow, &rig_and_stored(name).1).unwrap_err().to_string();
+        assert!(error.contains("the limit of the cart speed is exceeded"), "{name}: {error}");
     }
 }
 

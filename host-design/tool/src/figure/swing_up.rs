@@ -26,8 +26,8 @@ pub fn margins_figure(title: &str, motions: &[(Transition, Vec<Margin>)]) -> Fig
     panels.fold(Figure::new(title), Figure::with)
 }
 
-/// Largest force or acceleration, use of the rail, random runs that arrive, and fragility over the duration, a point for each
-/// candidate.
+/// Largest force or acceleration, use of the rail, random runs that arrive, and fragility over the duration, a point
+/// for each candidate.
 pub fn trade_figure(title: &str, solved: &[SolvedCandidate], input: CartInput) -> Figure {
     let durations = solved.iter().map(|one| one.duration_s);
     let (shortest, longest) =

@@ -35,7 +35,7 @@ keys! {
             Absent::Follows("60 to 90 % of the drive's limit");
         speed_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
             "largest speed of the cart in a plan",
-            Absent::Follows("90 % of speed_m_per_s in [limits], and of what the drive can");
+            Absent::Follows("90 % of the speeds of [limits] and drive");
         rail_m: Option<f64>, "m", Rule::POSITIVE,
             "largest distance of the cart from the middle in a plan", Absent::Follows("60 to 90 % of travel_m");
         mass_spread_percent: f64, "%", Rule::PERCENT,

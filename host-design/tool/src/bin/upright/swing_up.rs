@@ -225,8 +225,7 @@ pub(crate) fn with_margins(
 fn traded_text(solved: &[SolvedCandidate], input: CartInput) -> String {
     let largest = format!("{} ({})", input.name(), input.unit());
     let width = largest.len() + 1;
-    let head =
-        format!("duration (s)  {largest}  farthest (m)  fragility     arrive  with twice the errors");
+    let head = format!("duration (s)  {largest}  farthest (m)  fragility     arrive  with twice the errors");
     let line = |SolvedCandidate { duration_s, input, position_m, score, runs, wider }: &SolvedCandidate| {
         let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
         format!(
