@@ -70,13 +70,16 @@ impl FreeFit {
             (0..layout.links).any(|j| i == layout.presliding(j) && self.p[layout.dry(j + 1)] == 0.0)
         };
         let active: Vec<usize> = (0..size).filter(|&i| priors[i].deviation > 0.0 && !is_bare(i)).collect();
-        let estimate = |&i: &usize| Estimate {
-            kind: kinds[i],
-            old: priors[i].value,
-            new: self.p[i],
-            deviation: self.deviations[i],
-            halves: Some([self.halves[0][i], self.halves[1][i]]),
-            held_by_prior: self.deviations[i] > 0.5 * priors[i].deviation,
+        let estimate = |&i: &usize| {
+            let of_file = kinds[i].of_file();
+            Estimate {
+                kind: kinds[i],
+                old: of_file * priors[i].value,
+                new: of_file * self.p[i],
+                deviation: of_file * self.deviations[i],
+                halves: Some([0, 1].map(|half: usize| of_file * self.halves[half][i])),
+                held_by_prior: self.deviations[i] > 0.5 * priors[i].deviation,
+            }
         };
         found.estimates = active.iter().map(estimate).collect();
         let entry = |i: usize, j: usize| self.inverse[i * size + j];

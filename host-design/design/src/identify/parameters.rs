@@ -46,6 +46,11 @@ pub enum ParameterKind {
 }
 
 impl ParameterKind {
+    /// What the parameter is multiplied by to give the value of the rig file.
+    pub(super) fn of_file(self) -> f64 {
+        if let ParameterKind::Presliding(_) = self { PRESLIDING_PER_DEFLECTION } else { 1.0 }
+    }
+
     /// Name, with links and joints counted from 1, and SI unit.
     pub fn name_and_unit(self) -> (String, &'static str) {
         let of = |what: &str, joint: usize| format!("{what} {}", joint + 1);
@@ -59,7 +64,7 @@ impl ParameterKind {
             ParameterKind::CartDry => ("dry friction, cart".to_owned(), "N"),
             ParameterKind::JointDry(j) => (of("dry friction, joint", j), "N·m"),
             ParameterKind::AirDrag(j) => (of("air drag, link", j), "N·m·s²/rad²"),
-            ParameterKind::Presliding(j) => (of("bristle, joint", j), "rad"),
+            ParameterKind::Presliding(j) => (of("presliding, joint", j), "rad"),
             ParameterKind::Tilt => ("tilt of the rail".to_owned(), "rad"),
             ParameterKind::Delay => ("delay".to_owned(), "ticks"),
             ParameterKind::DeadZone => ("dead zone".to_owned(), "V"),
