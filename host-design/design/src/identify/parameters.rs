@@ -236,3 +236,19 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
     };
     layout.kinds().into_iter().map(prior).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::PerJoint;
+
+    #[test]
+    fn a_presliding_is_given_as_in_the_rig_file() {
+        let mut rig = Rig::from_path("../../rigs/single-quanser-ip02.toml".as_ref()).unwrap();
+        rig.reality.friction.presliding_rad = PerJoint::each(vec![2e-3]);
+        let bend = priors(&rig, rig.chain().unwrap(), false)[Layout { links: 1 }.presliding(0)].value;
+        let given = ParameterKind::Presliding(0).of_file() * bend;
+        assert!((given - 2e-3).abs() < 1e-15 && bend < 1.6e-3, "{given} {bend}");
+        assert_eq!(ParameterKind::JointDry(0).of_file(), 1.0);
+    }
+}
