@@ -143,7 +143,8 @@ fn relaxed(
     for factor in FACTORS {
         let mut remedy = Remedy::of(rig);
         let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
-        let Some(name) = changed.map(|limit| limit.name()).reduce(|first, _| first) else { return Ok(None) };
+        let named = changed.map(|limit| limit.name(rig.actuator.input()));
+        let Some(name) = named.reduce(|first, _| first) else { return Ok(None) };
         let outcome = RelaxedSearch::of(&remedy.rig, transition, tried)?;
         done();
         let text = format!("{} ({})", remedy.text(), outcome.text());

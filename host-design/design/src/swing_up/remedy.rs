@@ -1,7 +1,7 @@
 //! Changes of the rig file that relax one limit of the plans.
 
 use crate::number::rounded;
-use crate::rig::{PlantDescription, Rig};
+use crate::rig::{CartInput, PlantDescription, Rig};
 
 /// Significant digits of an advised number. It is tried as it is printed.
 const DIGITS: usize = 3;
@@ -18,11 +18,11 @@ pub(super) enum RigLimit {
 impl RigLimit {
     pub(super) const ALL: [Self; 4] = [Self::Rail, Self::Input, Self::Speed, Self::Duration];
 
-    /// Name of the limit for a user.
-    pub(super) fn name(self) -> &'static str {
+    /// Name of the limit for a user whose drive imposes `input`.
+    pub(super) fn name(self, input: CartInput) -> &'static str {
         match self {
             Self::Rail => "rail",
-            Self::Input => "force or acceleration",
+            Self::Input => input.name(),
             Self::Speed => "speed of the cart",
             Self::Duration => "duration",
         }
