@@ -58,7 +58,8 @@ pub(super) fn kalman<R: Real>(
         );
     let mut r = Matrix::from_diagonal(&rounding_variances(rig, &steps));
     if rig.actuator.input() == CartInput::Acceleration {
-        add_rounded_motion(&mut r, inputs, &sensors);
+        let measured: Vec<usize> = sensors.iter().map(|sensor| sensor.state).collect();
+        add_rounded_motion(&mut r, inputs, &measured);
         return with_known_cart(ad, [&q, &c, &r], steps, period);
     }
     gains(ad, [&q, &c, &r], steps, &noise.observer_poles, period)
@@ -111,12 +112,13 @@ fn stationary_covariance<R: Real>(mut f: Matrix<R>, w: Matrix<R>) -> Matrix<R> {
 }
 
 /// The drive moves the cart by whole steps, and the links swing with what is rounded: column `inputs` 0, the cart's
-/// acceleration, moves each angle by its entry times the cart's distance. `[q c r]` as in [`gains`].
-fn add_rounded_motion<R: Real>(r: &mut Matrix<R>, inputs: &Matrix<R>, sensors: &[Sensor]) {
+/// acceleration, moves each angle by its entry times the cart's distance. `measured` are the states that the sensors
+/// measure, that of the cart first, and `r` is the covariance of their rounding errors, to which it is added.
+pub(crate) fn add_rounded_motion<R: Real>(r: &mut Matrix<R>, inputs: &Matrix<R>, measured: &[usize]) {
     let of_cart = r[(0, 0)].clone();
-    let per_metre = |sensor: usize| inputs[(sensors[sensor].state + 1, 0)].clone();
-    for i in 1..sensors.len() {
-        for j in 1..sensors.len() {
+    let per_metre = |sensor: usize| inputs[(measured[sensor] + 1, 0)].clone();
+    for i in 1..measured.len() {
+        for j in 1..measured.len() {
             let rounded = per_metre(i) * &per_metre(j) * &of_cart;
             r[(i, j)] = r[(i, j)].clone() + &rounded;
         }

@@ -38,6 +38,7 @@ pub use drive_limits::DriveLimits;
 pub use error::{DesignError, Task};
 pub use governor::setpoint_step;
 pub use kalman::Kalman;
+pub(crate) use kalman::add_rounded_motion;
 pub use loops::{DesignPoles, Poles};
 pub use place::{Pole, dominant_pair, place};
 pub use riccati::{Cost, NoStabilisingSolution, Regulator, care, dare, is_stable, is_stable_sampled};

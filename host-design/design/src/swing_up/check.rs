@@ -78,8 +78,8 @@ pub(super) fn check(
     Ok(Peaks {
         duration_s: motion.duration_s(),
         drift,
-        input: motion.u.iter().fold(0.0, |most: f64, u| most.max(u.abs())),
-        position_m: largest(&|x| x[0].abs()),
+        input: motion.input(),
+        position_m: motion.position_m(),
         speed_m_per_s: largest(&|x| x[1].abs()),
         rate_rad_per_s: largest(&|x| x.iter().skip(3).step_by(2).fold(0.0, |most: f64, w| most.max(w.abs()))),
         used,

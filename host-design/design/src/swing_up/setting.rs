@@ -18,12 +18,12 @@ use crate::verify::Disturbance;
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
 /// than at rest.
 const JOINT_NOISE: f64 = 100.0;
-/// The same for a long chain on a stepper: its loop is so fast that a faster filter takes the spring of the motor for
+const INPUT_NOISE: f64 = 10.0;
+/// That of the joints of a long chain on a stepper: its loop is so fast that a faster filter takes the spring of the motor for
 /// motion of the links.
 const JOINT_NOISE_ON_STEPPER: f64 = 3.0;
 /// Least number of links of such a chain.
 const LONG_ON_STEPPER: usize = 3;
-const INPUT_NOISE: f64 = 10.0;
 /// Time after which the filter at rest has settled (s).
 const SETTLE_S: f64 = 2.0;
 

@@ -3,6 +3,7 @@
 use super::dynamics::Dynamics;
 use super::hold::{HeldTick, tick};
 use super::refine::Path;
+use crate::design::add_rounded_motion;
 use crate::numerics::{Matrix, Singular, solve_right};
 
 /// The ticks of a path with their derivatives.
@@ -155,22 +156,14 @@ impl<'a> PathFilter<'a> {
     }
 
     /// Covariances near `x`: what noise in half a tick adds to the state, and what rounding adds to the sensors.
-    ///
-    /// A drive that knows the cart moves it by whole steps, and the links swing with what is rounded: each by its
-    /// acceleration per acceleration of the cart, times the cart's distance.
     fn disturbances(&self, x: &[f64]) -> [Matrix<f64>; 2] {
         let (noise, mut b) = (self.noise, self.dynamics.inputs(x));
         let sensors = &noise.sensors;
         let mut rounding =
             Matrix::from_diagonal(&sensors.iter().map(|&(_, variance)| variance).collect::<Vec<_>>());
         if noise.knows_cart {
-            let of_cart = rounding[(0, 0)];
-            let per_metre = |sensor: usize| b[(sensors[sensor].0 + 1, 0)];
-            for i in 1..sensors.len() {
-                for j in 1..sensors.len() {
-                    rounding[(i, j)] += per_metre(i) * per_metre(j) * of_cart;
-                }
-            }
+            let measured: Vec<usize> = sensors.iter().map(|&(state, _)| state).collect();
+            add_rounded_motion(&mut rounding, &b, &measured);
             b.row_mut(1).fill(0.0);
         }
         let spread = &(&b * &Matrix::from_diagonal(&noise.at(x))) * &b.transpose();

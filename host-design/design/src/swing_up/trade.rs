@@ -50,7 +50,6 @@ pub fn solved(
     progress(ProgressStep::Begin("random runs", found.len() as u64));
     let MotionSpread { mass, friction, .. } = request.spread;
     let twice = MotionSpread { mass: 2.0 * mass, friction: 2.0 * friction, ..request.spread };
-    let largest = |most: f64, value: f64| most.max(value.abs());
     let judged = |candidate: &MotionCandidate| {
         let (motion, score) = (&candidate.motion, candidate.score);
         let runs = |spread: &MotionSpread| random_runs(&setting, motion, transition, spread, seed, RUNS);
@@ -58,8 +57,8 @@ pub fn solved(
         step(Some(score));
         Ok(SolvedCandidate {
             duration_s: motion.duration_s(),
-            input: motion.u.iter().copied().fold(0.0, largest),
-            position_m: motion.x.iter().map(|x| x[0]).fold(0.0, largest),
+            input: motion.input(),
+            position_m: motion.position_m(),
             score,
             runs,
             wider,

@@ -11,7 +11,7 @@ pub fn front_figure(front: &Front, input: CartInput, title: &str) -> Figure {
     let ends = front.0.iter().map(|point| point.scale);
     let largest = ends.fold(0.0, f64::max);
     let x = Axis::linear("multiple of the tolerances").range(0.0, 1.05 * largest);
-    let name = if input.is_force() { "force" } else { "acceleration" };
+    let name = input.name();
     let y = Axis::linear(format!("predicted ripple of the {name} ({} rms)", input.unit()));
     let mut panel = Panel::new(x, y);
     for (number, law) in Law::ALL.into_iter().enumerate() {
