@@ -19,8 +19,8 @@ use crate::verify::Disturbance;
 /// than at rest.
 const JOINT_NOISE: f64 = 100.0;
 const INPUT_NOISE: f64 = 10.0;
-/// That of the joints of a long chain on a stepper: its loop is so fast that a faster filter takes the spring of the motor for
-/// motion of the links.
+/// That of the joints of a long chain on a stepper: its loop is so fast that a faster filter takes the spring of the
+/// motor for motion of the links.
 const JOINT_NOISE_ON_STEPPER: f64 = 3.0;
 /// Least number of links of such a chain.
 const LONG_ON_STEPPER: usize = 3;
