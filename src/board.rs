@@ -112,6 +112,9 @@ pub trait Board<const NY: usize> {
     /// Whether the board gives the pulses of [`Output::pulses`]. If it does not and the gain table's drive needs them,
     /// the motor stays off.
     const GIVES_PULSES: bool = false;
+    /// Whether the board itself finds, between ticks, a bit of the tables that changes. Then the control task reads the
+    /// gain table only before arming.
+    const CHECKS_TABLES: bool = false;
 
     /// The tick to which the timer is set that starts the control task (s). If the gain table is for another one,
     /// the motor stays off.

@@ -45,7 +45,7 @@ struct ActiveLaw<'t, const NX: usize, T: Scalar> {
     gains: &'t LawGains<NX, T>,
     /// Whether the force depends on earlier ticks by more than the estimate: through a pending force or an integral.
     has_memory: bool,
-    /// Whether the law has no such memory and the table no known friction, so that a tick can skip both.
+    /// Whether the law has no such memory and the table neither known friction nor pulses, so that a tick can skip them.
     is_plain: bool,
 }
 
@@ -53,7 +53,8 @@ impl<'t, const NX: usize, T: Scalar> ActiveLaw<'t, NX, T> {
     fn new<const NY: usize>(table: &GainTable<NX, NY, T>, law: Law, gains: &'t LawGains<NX, T>) -> Self {
         let zero = T::default();
         let has_memory = table.delay_ticks == 1 || gains.k_pending != zero || gains.k_integral != zero;
-        Self { law, gains, has_memory, is_plain: !has_memory && table.friction.is_none() }
+        let is_plain = !has_memory && table.friction.is_none() && table.steps.is_none();
+        Self { law, gains, has_memory, is_plain }
     }
 }
 
@@ -351,9 +352,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     }
 
     /// Limits the force and converts it for the power stage.
-    #[inline]
+    #[inline(always)]
     fn actuate(&mut self, requested: T) -> MotorCommand<T> {
-        if let Some(steps) = &self.table.steps {
+        if !self.active.is_plain
+            && let Some(steps) = &self.table.steps
+        {
             return self.step(steps, requested);
         }
         let limited = saturate(requested, self.table.force_limit_n);

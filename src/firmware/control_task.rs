@@ -36,7 +36,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         commands: Consumer<'q, Command>,
         messages: Producer<'q, Message<NX, NY>>,
     ) -> Self {
-        firmware.compare_board(board.tick_s(), B::GIVES_PULSES);
+        firmware.compare_board(board.tick_s(), B::GIVES_PULSES, B::CHECKS_TABLES);
         Self { firmware, board, commands, messages, cycles: 0 }
     }
 

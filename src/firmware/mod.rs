@@ -67,6 +67,8 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     debounce: Debounce,
     checksum_scan: ChecksumScan<'t>,
     swing_up_scan: ChecksumScan<'t>,
+    /// See [`Board::CHECKS_TABLES`](crate::board::Board::CHECKS_TABLES).
+    board_checks_tables: bool,
     /// Whether the table was sound at the start.
     is_usable: bool,
     /// Whether the whole table has been found intact since arming.
@@ -113,7 +115,7 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
 }
 
 /// Number of words of the table that are checked per tick while armed, when the whole table has to be read before the
-/// motor comes on. In other states it is one.
+/// motor comes on. In other states it is one, or none if the board checks the tables.
 const WORDS_PER_ARMED_TICK: u32 = 8;
 
 /// A timer counts whole cycles, so its tick may differ from the table's by this share.
@@ -155,6 +157,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
             swing_up_scan: ChecksumScan::default(),
+            board_checks_tables: false,
             is_usable,
             is_checked: false,
             table,
@@ -186,10 +189,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// Takes the tick of the board's timer (s), and whether the board gives pulses. If the tick is not the table's, or
-    /// pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
+    /// Takes the tick of the board's timer (s), and whether the board gives pulses and checks the tables. If the tick is
+    /// not the table's, or pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
     /// [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
-    pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool) {
+    pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool, checks_tables: bool) {
+        self.board_checks_tables = checks_tables;
         let difference = f32::abs(timer_tick_s - self.table.tick_s);
         let lacks_pulses = self.table.steps.is_some() && !gives_pulses;
         if lacks_pulses || difference.is_nan() || difference > TICK_TOLERANCE * self.table.tick_s {
@@ -352,13 +356,19 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         {
             self.trip(fault, None);
         }
-        let words = if self.supervisor.state() == State::Armed { WORDS_PER_ARMED_TICK } else { 1 };
+        let words = match self.supervisor.state() {
+            State::Armed => WORDS_PER_ARMED_TICK,
+            _ => u32::from(!self.board_checks_tables),
+        };
         match self.checksum_scan.next_words(self.table, words) {
             Some(crc) if crc != self.table.crc => self.trip(Fault::Table, None),
             Some(_) => self.is_checked = true,
             None => {}
         }
-        if S::IS_POSSIBLE && self.swing_up.scan(&mut self.swing_up_scan) == Some(false) {
+        if S::IS_POSSIBLE
+            && !self.board_checks_tables
+            && self.swing_up.scan(&mut self.swing_up_scan) == Some(false)
+        {
             self.trip(Fault::Table, None);
         }
         let reply = command.map(|command| Reply { id: command.id, answer: self.answer(command) });

@@ -17,11 +17,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             State::Balancing => Equilibrium::HANGING,
             _ => Equilibrium::UPRIGHT,
         };
-        self.transition(to).map_or_else(|inhibits| inhibits, |motion| self.motion_inhibits(&motion))
+        self.transition(to).map_or_else(|inhibits| inhibits, |motion| self.motion_inhibits(motion))
     }
 
     /// The motion from the present equilibrium to the equilibrium `to`.
-    fn transition(&self, to: Equilibrium) -> Result<MotionTable<'t>, Inhibits> {
+    fn transition(&self, to: Equilibrium) -> Result<&'t MotionTable<'t>, Inhibits> {
         let swing_up = self.swing_up;
         let Some(motions) = swing_up.motions() else { return Err(Inhibits::NO_SWING_UP) };
         let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
@@ -29,7 +29,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             let is_balanced = self.supervisor.state().controls();
             return Err(if is_balanced { Inhibits::RUNNING } else { Inhibits::NOT_BALANCING });
         }
-        motions.between(from, to).copied().ok_or(Inhibits::NO_TRANSITION)
+        motions.between(from, to).ok_or(Inhibits::NO_TRANSITION)
     }
 
     /// The present equilibrium: the one at which the links are balanced; hanging, if they are not balanced.
@@ -78,7 +78,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     pub(super) fn go_to(&mut self, to: Equilibrium, id: u64) -> Result<(), Inhibits> {
         let motion = self.transition(to)?;
         let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
-        let inhibits = self.motion_inhibits(&motion);
+        let inhibits = self.motion_inhibits(motion);
         let counts = self.table.limits.unwound(self.controller.encoders().counts(), from);
         if let State::Balancing | State::Holding = self.supervisor.state() {
             if to == Equilibrium::hanging(NY - 1) {
@@ -96,7 +96,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             }
         }
         self.goal = to;
-        self.moving = Some(Playback::new(motion, self.controller.law_state().setpoint));
+        self.moving = Some(Playback::new(*motion, self.controller.law_state().setpoint));
         Ok(())
     }
 

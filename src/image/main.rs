@@ -3,7 +3,7 @@
 //! | task | started by | priority | does |
 //! |---|---|---|---|
 //! | `tick` | SysTick, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
-//! | `idle` | every interrupt | lowest | bytes → commands, telemetry → bytes |
+//! | `idle` | every interrupt | lowest | bytes → commands, telemetry → bytes; checks memory |
 //!
 //! The tasks share no locked resource, only single-producer, single-consumer queues. So no task below `tick` can delay
 //! it by more than an interrupt entry.
@@ -44,7 +44,7 @@ mod app {
     use upright::protocol::serial_link::SerialLink;
     use upright::table::GainTable;
 
-    use crate::board::{Buffer, Hardware, SerialLine, set_up, start_ticks};
+    use crate::board::{Buffer, Hardware, MemoryCheck, SerialLine, set_up, start_ticks};
 
     #[shared]
     struct Shared {}
@@ -54,6 +54,7 @@ mod app {
         control: ControlTask<'static, 'static, Hardware, STATES, SENSORS, SwingUp>,
         link: SerialLink<'static, STATES, SENSORS>,
         line: SerialLine,
+        memory: MemoryCheck,
     }
 
     #[init(local = [
@@ -68,11 +69,12 @@ mod app {
         let (hardware, line, start) = set_up(cx.device, cx.local.buffer);
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
+        let memory = MemoryCheck::new(table, start.image);
         let firmware = Firmware::new(table, &SWING_UP, Hardware::WIDTHS, start);
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();
         start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);
-        (Shared {}, TaskState { control, link: SerialLink::new(to_control, to_link), line })
+        (Shared {}, TaskState { control, link: SerialLink::new(to_control, to_link), line, memory })
     }
 
     #[task(binds = SysTick, priority = 3, local = [control])]
@@ -80,7 +82,7 @@ mod app {
         cx.local.control.tick_with(hot_path::act, hot_path::predict);
     }
 
-    #[idle(local = [link, line])]
+    #[idle(local = [link, line, memory])]
     fn idle(cx: idle::Context) -> ! {
         loop {
             while let Some(byte) = cx.local.line.read() {
@@ -90,6 +92,9 @@ mod app {
                 && let Some(frame) = cx.local.link.transmit()
             {
                 cx.local.line.write(frame);
+            }
+            if let Some(address) = cx.local.memory.advance() {
+                crate::board::stop_for_memory(address);
             }
             crate::board::wait_for_interrupt();
         }

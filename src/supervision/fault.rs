@@ -41,7 +41,7 @@ pub enum Fault {
     Table = 15,
     /// Ticks stopped: the independent watchdog has reset the microcontroller.
     Watchdog = 16,
-    /// The program has failed: panic, processor fault or stack overflow.
+    /// The program has failed: panic, processor fault, stack overflow or changed memory.
     Crash = 17,
     /// The crystal or the PLL has failed to start, or the crystal has the wrong frequency.
     Clock = 18,
@@ -219,8 +219,8 @@ impl Fault {
         Entry {
             fault: Fault::Crash,
             name: "crash",
-            condition: "panic, processor fault or stack overflow: the handler turns the motor off, the watchdog resets; \
-                        the firmware starts disarmed and keeps this as the reason",
+            condition: "panic, processor fault, stack overflow, a changed bit of table or code: the motor is turned \
+                        off, the watchdog resets; the firmware starts disarmed and keeps this as the reason",
             reaction: Reaction::Hardware("at once, in the handler"),
             remedy: "report it with the firmware's version; home and check the signs again",
         },

@@ -220,9 +220,9 @@ pub trait SwingUp<const NX: usize, const NY: usize> {
 #[derive(Debug, Clone, Copy)]
 pub struct Motions<'t, const NY: usize> {
     /// From hanging to upright.
-    pub raise: MotionTable<'t>,
+    pub raise: &'t MotionTable<'t>,
     /// From upright to hanging.
-    pub lower: MotionTable<'t>,
+    pub lower: &'t MotionTable<'t>,
     /// Between other equilibria.
     pub others: &'t [TransitionTable<'t>],
     /// See [`SwingUpTable::limits`].
@@ -233,13 +233,13 @@ pub struct Motions<'t, const NY: usize> {
 
 impl<'t, const NY: usize> Motions<'t, NY> {
     /// The motion from one equilibrium to another, if there is one.
-    pub fn between(&self, from: Equilibrium, to: Equilibrium) -> Option<&MotionTable<'t>> {
+    pub fn between(&self, from: Equilibrium, to: Equilibrium) -> Option<&'t MotionTable<'t>> {
         let hanging = Equilibrium::hanging(NY - 1);
         if (from, to) == (hanging, Equilibrium::UPRIGHT) {
-            return Some(&self.raise);
+            return Some(self.raise);
         }
         if (from, to) == (Equilibrium::UPRIGHT, hanging) {
-            return Some(&self.lower);
+            return Some(self.lower);
         }
         let leads = |other: &&TransitionTable<'_>| (other.from, other.to) == (from.bits(), to.bits());
         self.others.iter().find(leads).map(|other| &other.motion)
@@ -275,7 +275,7 @@ impl<const NX: usize, const NY: usize, const N: usize> SwingUp<NX, NY> for Swing
 
     fn motions(&self) -> Option<Motions<'_, NY>> {
         let Self { raise, lower, others, limits, thresholds, .. } = self;
-        Some(Motions { raise: *raise, lower: *lower, others, limits, thresholds })
+        Some(Motions { raise, lower, others, limits, thresholds })
     }
 
     fn predict(&self, state: &mut [f32; NX], force: f32, dt: f32) {

@@ -17,6 +17,13 @@ extern "C" fn crashed(frame: *const u32) -> ! {
     stop(frame)
 }
 
+/// Turns the motor off for good because memory has changed. In the record of this crash, the address stands for the
+/// program counter.
+#[cold]
+pub(crate) fn stop_for_memory(address: u32) -> ! {
+    crashed([0, 0, 0, 0, 0, 0, address, 0].as_ptr())
+}
+
 // After a stack overflow the stack pointer is below the memory. Pushing a register would fault again and lock up the
 // core, so the stack pointer is reset before the first push.
 global_asm!(

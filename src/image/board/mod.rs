@@ -2,7 +2,8 @@
 //!
 //! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
 //! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes;
-//! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; `stop` turns the motor
+//! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; a `MemoryCheck` finds
+//! memory that has changed; `stop` turns the motor
 //! off for good; `CLOCK_HZ` is the core clock, `TICK_US` the range of ticks.
 
 #![allow(unsafe_code)]
@@ -44,16 +45,18 @@ mod in_the_loop;
 use f4::sleep;
 #[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 pub(crate) use f4::{
-    CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Board as Hardware, TICK_US, set_up, start_ticks,
-    stop,
+    CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Board as Hardware, MemoryCheck, TICK_US, set_up,
+    start_ticks, stop,
 };
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
 use in_the_loop::sleep;
 #[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
 pub(crate) use in_the_loop::{
     CLOCK_HZ, ReceivedBytes as Buffer, SimulatedLine as SerialLine, SimulatedPins as Hardware, TICK_US,
-    set_up, start_ticks, stop,
+    UncheckedMemory as MemoryCheck, set_up, start_ticks, stop,
 };
+
+pub(crate) use handlers::stop_for_memory;
 
 /// Waits for the next interrupt.
 ///

@@ -67,6 +67,11 @@ impl CaptureTimer {
         self.edges_seen = now;
     }
 
+    /// Counts from 0; what an edge before would capture is lost.
+    fn start(&mut self, now: Time) {
+        (self.started, self.edges_seen) = (now, now);
+    }
+
     fn captures(&self) -> bool {
         self.control & 1 != 0 && self.enabled & 1 != 0 && self.inputs & 3 == 1 && self.option & 3 == 2
     }
@@ -104,14 +109,14 @@ impl CaptureTimer {
         match offset {
             0x00 => {
                 if value & 1 != 0 && self.control & 1 == 0 {
-                    self.started = now;
+                    self.start(now);
                 }
                 self.control = value;
             }
             0x0c if value != 0 => return Err(Violation::NotModelled("interrupts of TIM11")),
             0x0c => {}
             0x10 => self.status &= value,
-            0x14 => self.started = now,
+            0x14 => self.start(now),
             0x18 if value & 0xf0 != 0 || value & 3 > 1 => {
                 return Err(Violation::NotModelled("this input mode of TIM11"));
             }

@@ -32,9 +32,15 @@ pub fn joint(sensor: u8) -> String {
 
 /// Where the program has crashed: the words that the board records, with the registers of a Cortex-M as its manual
 /// names them (ARM DDI 0403, B3.2). Program counter (PC) and link register (LR) are 0 after a panic, and after a stack
-/// overflow, which leaves no room for them; BFAR is valid if bit 15 of CFSR is set.
+/// overflow, which leaves no room for them; BFAR is valid if bit 15 of CFSR is set. An address without a link register
+/// and without a fault of the processor is that of memory that has changed.
 pub fn crash(record: &CrashRecord) -> String {
     let CrashRecord([pc, lr, cfsr, hfsr, bfar]) = record;
+    if *pc != 0 && [lr, cfsr, hfsr] == [&0; 3] {
+        return format!(
+            "memory has changed at {pc:#010x}: the gain table, or, at the end of the image, its code"
+        );
+    }
     format!("crash at PC {pc:#010x}, LR {lr:#010x}, CFSR {cfsr:#010x}, HFSR {hfsr:#010x}, BFAR {bfar:#010x}")
 }
 

@@ -105,7 +105,7 @@ defects! {
     HostWireOpen Board "the wire from a host that commands the set-point is open" => Fault(F::LinkLost, Link);
     LineNoise Board "random bytes at wrong baud rates on the serial line" => Ignored;
     LineFlood Board "bytes without a pause on the serial line" => Ignored;
-    TableBit Board "a bit of the gain table in use changes" => Changed;
+    TableBit Board "a bit of the gain table in use changes" => Fault(F::Crash, Exactly(9));
     RamBit Board "a bit of the firmware's variables or stack changes" => Bounded;
     WriteLost Board "a write to a register of the motor's timer is lost at power-up" => Refused(Inhibits::FAULT);
     EncoderWireOpen Nothing "a wire of an encoder is open: its count alternates between two values" => Off(10);

@@ -1,7 +1,5 @@
 //! How the flashed image reacts to hardware that is not as it should be, on the virtual board.
 
-use std::ops::Range;
-
 use upright::board::Contacts;
 use upright::gains::{TABLE, TICK_S};
 use upright::protocol::message::{Answer, CrashRecord, Info, Reply, Request, Reset};
@@ -126,19 +124,10 @@ fn another_chip_is_noticed() {
 
 /// Address of the table's first gain in flash, among the initial values of variables.
 fn first_gain(board: &SimulatedBoard) -> u32 {
-    gain_within(board, 0x0800_0000..0x0801_0000)
-}
-
-/// Address in RAM of the first gain that the image uses.
-fn first_gain_in_use(board: &SimulatedBoard) -> u32 {
-    gain_within(board, 0x2000_1400..0x2000_3000)
-}
-
-fn gain_within(board: &SimulatedBoard, addresses: Range<u32>) -> u32 {
     let gains: Vec<u32> =
         TABLE.laws.lqr.as_ref().unwrap().k.iter().take(3).map(|gain| gain.to_bits()).collect();
     let here = |at: &u32| (0..3).all(|i| board.word(at + 4 * i) == Some(gains[i as usize]));
-    addresses.step_by(4).find(here).expect("the table is there")
+    (0x0800_0000..0x0801_0000).step_by(4).find(here).expect("the table is there")
 }
 
 /// A bit of the first gain flips in flash before power comes.
@@ -155,29 +144,6 @@ fn a_damaged_table_is_reported_and_cannot_be_cleared() {
     assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
     assert_eq!(run.replies, [Reply { id: 1, answer: Answer::NotNow(Inhibits::TABLE) }]);
     stop_the_crystal(&mut run);
-}
-
-/// The image uses a copy of the table in RAM, and checks it over and over; flash is only read at the next start.
-#[test]
-fn a_flipped_bit_of_the_table_is_found_in_ram_within_two_passes_and_in_flash_at_the_next_start() {
-    let Some(image) = image() else { return };
-    let two_passes_s = 1.0;
-    let mut run = Powered::strict(&image, &Conditions::f405(1));
-    run.run(0.055);
-    let address = first_gain_in_use(&run.board);
-    run.board.apply(Input::FlipBit { address, bit: 5 });
-    run.run(0.055 + two_passes_s);
-    assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
-
-    let mut run = Powered::strict(&image, &Conditions::f405(1));
-    run.run(0.055);
-    let address = first_gain(&run.board);
-    run.board.apply(Input::FlipBit { address, bit: 5 });
-    run.run(0.055 + two_passes_s);
-    assert_eq!(run.last(), (State::Disarmed, None));
-    run.board.apply(Input::DebuggerReset);
-    run.run(0.1 + two_passes_s);
-    assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
 }
 
 /// The crystal stops: the handler stops the program, and the watchdog resets within six ticks.

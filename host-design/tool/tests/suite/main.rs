@@ -18,6 +18,7 @@ mod image;
 mod import_command;
 mod jog;
 mod lossy_line;
+mod memory_check;
 mod monitor;
 mod observer_design;
 mod paper;

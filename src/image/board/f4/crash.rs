@@ -1,10 +1,9 @@
-//! The record of a crash, which survives a reset, and the checksum that identifies the image.
+//! The record of a crash, which survives a reset.
 
 use core::mem::MaybeUninit;
 
 use cortex_m::peripheral::SCB;
 use upright::protocol::message::CrashRecord;
-use upright::table::checksum::crc32;
 
 /// The last crash. It is not initialised at start-up, so it survives a reset.
 #[unsafe(link_section = ".uninit.CRASH")]
@@ -45,22 +44,5 @@ pub(super) fn record(frame: *const u32) {
         let scb = &*SCB::PTR;
         let record = CrashRecord([saved(6), saved(5), scb.cfsr.read(), scb.hfsr.read(), scb.bfar.read()]);
         (&raw mut CRASH).cast::<Crash>().write_volatile(Crash { mark: NEW, record });
-    }
-}
-
-unsafe extern "C" {
-    static __sdata: u32;
-    static __edata: u32;
-    static __sidata: u32;
-}
-
-/// CRC-32 of the image in flash: from its start to the end of the initial values of variables, which come last.
-pub(super) fn image_checksum() -> u32 {
-    const FLASH: usize = 0x0800_0000;
-    // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
-    unsafe {
-        let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
-        let end = (&raw const __sidata) as usize + values;
-        crc32(0, core::slice::from_raw_parts(FLASH as *const u8, end - FLASH))
     }
 }

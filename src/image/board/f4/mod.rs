@@ -5,6 +5,7 @@ mod clock;
 mod crash;
 mod encoders;
 mod guard;
+mod memory;
 mod motor;
 mod pins;
 mod serial;
@@ -23,6 +24,7 @@ use upright::protocol::message::Start;
 
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
+pub(crate) use memory::MemoryCheck;
 use motor::Motor;
 pub(crate) use serial::{DmaBuffer, DmaLine};
 use supply::Supply;
@@ -80,7 +82,7 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
         late_ticks: 0,
         limits: [false; 2],
     };
-    (hardware, line, Start { reset, crash, image: crash::image_checksum() })
+    (hardware, line, Start { reset, crash, image: memory::image_checksum() })
 }
 
 impl F4Board {
@@ -92,6 +94,8 @@ impl F4Board {
 
 impl Board<SENSORS> for F4Board {
     const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
+    /// See [`MemoryCheck`].
+    const CHECKS_TABLES: bool = true;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         pins::show_tick(true);
