@@ -45,7 +45,7 @@ struct ActiveLaw<'t, const NX: usize, T: Scalar> {
     gains: &'t LawGains<NX, T>,
     /// Whether the force depends on earlier ticks by more than the estimate: through a pending force or an integral.
     has_memory: bool,
-    /// Whether the law has no such memory and the table neither known friction nor pulses, so that a tick can skip them.
+    /// Whether the law has no such memory, and the table no known friction and no pulses: a tick can skip them.
     is_plain: bool,
 }
 

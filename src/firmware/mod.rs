@@ -189,8 +189,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// Takes the tick of the board's timer (s), and whether the board gives pulses and checks the tables. If the tick is
-    /// not the table's, or pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
+    /// Takes the tick of the board's timer (s), and whether the board gives pulses and checks the tables. If the tick
+    /// is not the table's, or pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
     /// [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
     pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool, checks_tables: bool) {
         self.board_checks_tables = checks_tables;

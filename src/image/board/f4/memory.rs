@@ -52,9 +52,9 @@ impl MemoryCheck {
         Self { table, image_checksum, wait: TICKS_PER_CHECK, read: 0, crc: 0 }
     }
 
-    /// To be called after each interrupt. If it is time, compares all of the table with its initial values in flash, and
-    /// reads the next part of the image. Returns where a bit has changed: the address of the table's word, or of the end
-    /// of the image.
+    /// To be called after each interrupt. If it is time, compares all of the table with its initial values in flash,
+    /// and reads the next part of the image. Returns where a bit has changed: the address of the table's word, or of
+    /// the end of the image.
     pub(crate) fn advance(&mut self) -> Option<u32> {
         self.wait -= 1;
         if self.wait > 0 {
