@@ -23,6 +23,7 @@ mod observer_design;
 mod paper;
 mod paper_matrices;
 mod powered;
+mod real_recordings;
 mod report_browser;
 mod report_command;
 mod report_devtools;
