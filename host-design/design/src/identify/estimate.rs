@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use super::at_rest;
 use super::channel::chain_of;
 use super::covariance::{changes, deviations};
+use super::doubt::Doubt;
 use super::error::IdentifyError;
 use super::estimated::{Estimate, Identification};
 use super::free;
@@ -199,6 +201,10 @@ impl Fitted<'_> {
         // Noise and smoothing were tuned for the parameters before this fit.
         let mut model = model.clone();
         model.smoothing = filter.smoothing(&p, &noise);
+        model.excess = at_rest::excess(&Filter { model: &model, ..filter }, &p, &noise);
+        if model.excess != [0.0; 2] {
+            found.doubts.push(Doubt::LargerAtRest(model.excess));
+        }
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);
         let (p, normal) = filter.fit(&p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;

@@ -25,6 +25,7 @@
 //!
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
+mod at_rest;
 mod channel;
 mod convert;
 mod covariance;

@@ -183,7 +183,8 @@ mod tests {
         assert!(chain.links[1].mass_kg * p[layout.length(0)] > p[layout.first_moment(0)]);
         let found = realise(&chain, &p, None).unwrap();
         let [first, second] = [&found.links[0], &found.links[1]];
-        let close = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
+        let close =
+            |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
         close(second.mass_kg * second.centre_m, p[layout.first_moment(1)]);
         let moment = first.mass_kg * first.centre_m + second.mass_kg * first.length_m;
         close(moment, p[layout.first_moment(0)]);

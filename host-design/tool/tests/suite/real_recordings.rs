@@ -117,8 +117,7 @@ fn a_machine_that_the_model_lacks_is_refused() {
     let text = std::fs::read_to_string(ignorant("double-multiarm", folder.path())).unwrap();
     let file = folder.path().join("driven.toml");
     std::fs::write(&file, text.replace("= 40000", "= 16471")).unwrap();
-    let (used, unused) =
-        (recordings("driven-double", &["1", "2", "4"]), recordings("driven-double", &["3"]));
+    let (used, unused) = (recordings("driven-double", &["1", "2", "4"]), recordings("driven-double", &["3"]));
     let (all, code) = identified(&file, &used, &unused, &["--angles", "relative", "--zero", "hanging"]);
     assert_eq!(code, 3, "{all}");
     assert!(all["refused"].as_str().unwrap().contains("does not fit"), "{all}");
