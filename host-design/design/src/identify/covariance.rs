@@ -8,7 +8,7 @@ use super::record::Record;
 /// Factors on the smoothing of the dry friction, one for each refit.
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Factor on the excess of the friction at rest, if there is one.
-const OTHER_EXCESS: f64 = 0.7;
+const OTHER_EXCESS: f64 = 0.5;
 /// Iterations of each refit.
 const ITERATIONS: usize = 2;
 /// Terms that are added in quadrature to a statistical deviation.

@@ -30,6 +30,8 @@ mod channel;
 mod convert;
 mod covariance;
 mod coverage;
+#[cfg(test)]
+mod decay;
 mod doubt;
 mod error;
 mod estimate;

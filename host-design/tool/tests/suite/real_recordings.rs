@@ -39,7 +39,9 @@ fn identified(file: &Path, used: &[String], unused: &[String], options: &[&str])
     arguments.push("--predict");
     arguments.extend(unused.iter().map(String::as_str));
     let output = upright(&arguments);
-    (serde_json::from_str(stdout(&output)).expect(stderr(&output)), status(&output))
+    let all =
+        serde_json::from_str(stdout(&output)).unwrap_or_else(|error| panic!("{error}: {}", stderr(&output)));
+    (all, status(&output))
 }
 
 const ABSOLUTE: [&str; 6] = ["--angles", "absolute", "--zero", "upright", "--period", "0.004"];
