@@ -1,9 +1,7 @@
-//! Dry friction that is larger at rest than in motion (R. Stribeck, 1902).
+//! Whether the dry friction is larger at rest than in motion.
 
 use super::prediction::Filter;
 
-/// Speed of the cart (m/s) and rate of a joint (rad/s) at which half of the excess is left: those of `[reality]`.
-pub(super) const SPEEDS: [f64; 2] = [0.01, 0.1];
 /// Excesses that are tried, as shares of the friction in motion.
 const EXCESSES: [f64; 5] = [0.0, 0.15, 0.3, 0.45, 0.6];
 /// Duration of the part of the record on which they are tried (s).
@@ -12,14 +10,6 @@ const TRIAL_S: f64 = 20.0;
 const ITERATIONS: usize = 2;
 /// Least fall of -2 ln L with which an excess is believed.
 const LEAST_GAIN: f64 = 12.0;
-
-/// Factor of the dry friction at `speed`, with the excess at rest and the speed at which half of it is left, and its
-/// derivative by the speed.
-pub(super) fn factor(excess: f64, half_at: f64, speed: f64) -> [f64; 2] {
-    let ratio = speed / half_at;
-    let left = excess / (1.0 + ratio * ratio);
-    [1.0 + left, -2.0 * left * ratio / (half_at * (1.0 + ratio * ratio))]
-}
 
 /// The excesses of the cart's and the joints' friction at rest under which the measurements are most likely: 0, unless
 /// the record shows otherwise.

@@ -33,6 +33,13 @@ pub enum Doubt {
     },
 }
 
+impl Doubt {
+    /// What the excesses of the friction at rest of cart and joints say, if there are any.
+    pub(super) fn of_excess(excess: [f64; 2]) -> Option<Self> {
+        (excess != [0.0; 2]).then_some(Doubt::LargerAtRest(excess))
+    }
+}
+
 impl core::fmt::Display for Doubt {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {

@@ -55,6 +55,7 @@ mod recordings;
 mod rows;
 mod shooting;
 mod step;
+mod stribeck;
 mod table;
 mod verdict;
 mod window_errors;

@@ -3,9 +3,9 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::at_rest;
 use super::parameters::Layout;
 use super::rows::add_multiple;
+use super::stribeck;
 
 /// The chain in the notation of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
 /// φ_n.
@@ -24,7 +24,7 @@ use super::rows::add_multiple;
 /// ```
 ///
 /// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. If the friction at rest is larger than in
-/// motion, c_0 and c_i have a factor ([`at_rest::factor`]). Here
+/// motion, c_0 and c_i have a factor ([`stribeck::factor`]). Here
 /// e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
 /// instead of the first equation. A cart that reverses is held by its friction until the bristle has
 /// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
@@ -103,7 +103,7 @@ impl Model {
 
     /// Factor of the dry friction of the cart at the speed `v` (m/s), and its derivative.
     fn cart_factor(&self, v: f64) -> [f64; 2] {
-        at_rest::factor(self.excess[0], at_rest::SPEEDS[0], v)
+        stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v)
     }
 
     /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
@@ -115,7 +115,7 @@ impl Model {
             let bristle = at[2 * self.coordinates() + 1 + joint];
             return [viscous * rate + dry * bristle, viscous, bristle];
         }
-        let [factor, by_rate] = at_rest::factor(self.excess[1], at_rest::SPEEDS[1], rate);
+        let [factor, by_rate] = stribeck::factor(self.excess[1], stribeck::SPEEDS[1], rate);
         let direction = libm::tanh(rate / smoothing);
         let slope = factor * (1.0 - direction * direction) / smoothing + by_rate * direction;
         [viscous * rate + dry * factor * direction, viscous + dry * slope, factor * direction]

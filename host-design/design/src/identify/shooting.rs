@@ -15,8 +15,6 @@ use crate::parallel;
 pub(super) const WINDOW_S: f64 = 0.25;
 /// Factors on the damping: after a step that failed, and after one that lowered the cost.
 const DAMPING: [f64; 2] = [10.0, 0.2];
-/// Damping up to which the initial states take whole steps.
-const LEAST_DAMPING: f64 = 0.1;
 /// Fractions of a step that are tried one after the other when only the initial state of a window is fitted.
 const STEPS: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 /// A fit ends when a step lowers the cost by less than this share.
@@ -162,9 +160,7 @@ impl Shooting<'_> {
         let mut damping = 1e-3;
         let (mut normal, mut reduced) = self.linearise(fit, weights);
         for _ in 0..iterations {
-            // Damping does not shorten the steps of the initial states: where it is large, they are shortened, too.
-            let share = (LEAST_DAMPING / damping).min(1.0);
-            let Some(trial) = self.stepped(fit, &normal, &reduced, damping, share) else {
+            let Some(trial) = self.stepped(fit, &normal, &reduced, damping, 1.0) else {
                 damping *= DAMPING[0];
                 continue;
             };
