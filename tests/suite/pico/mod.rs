@@ -66,7 +66,10 @@ fn assert_equal(run: &Recorded, answers: &[Answer]) -> u32 {
     most
 }
 
-fn no_defect() -> Option<(State, usize, fn(&mut Pins))> {
+/// What changes the pins, and when: from that many ticks after the first one in a state.
+type Defect = (State, usize, fn(&mut Pins));
+
+fn no_defect() -> Option<Defect> {
     None
 }
 
