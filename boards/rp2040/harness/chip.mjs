@@ -76,7 +76,9 @@ export class Pico {
       block[access] = (offset, value) => {
         this.#catchUp();
         this.settling = SETTLING;
-        return plain(offset, value);
+        const result = plain(offset, value);
+        this.stepper = this.steps?.isUsed ? this.steps.machine : null;
+        return result;
       };
     }
   }
@@ -156,7 +158,7 @@ export class Pico {
   }
 
   #stepStateMachines(cycles) {
-    const stepper = this.steps.isUsed ? this.steps.machine : null;
+    const { stepper } = this;
     for (let cycle = 0; cycle < cycles; cycle++) {
       for (const block of this.chip.pio) {
         for (const machine of block.machines) if (machine.enabled && machine !== stepper) machine.step();
@@ -168,7 +170,7 @@ export class Pico {
   /** Time passes: for the timers, the encoders, and the state machines. */
   #pass(cycles) {
     this.clock.tick(cycles * CYCLE_NS);
-    if (this.steps.isUsed) this.steps.pass(cycles);
+    if (this.stepper) this.steps.pass(cycles);
     const running = this.everyCycle ? cycles : Math.min(cycles, this.settling);
     this.#stepStateMachines(running);
     this.settling -= Math.min(running, this.settling);

@@ -45,6 +45,7 @@ export class StepOutput {
   pass(cycles) {
     const { machine } = this;
     const end = this.now + cycles;
+    if (machine.waiting && machine.txFIFO.empty && this.block.pinValues === this.pins) { this.now = end; return; }
     this.#watch();
     this.credit += cycles;
     const divider = machine.clockDivInt;
@@ -78,6 +79,7 @@ export class StepOutput {
     if (!level && this.level) train.width = Math.min(train.width, now - this.rose);
     this.level = level;
     this.direction = direction;
+    this.pins = this.block.pinValues;
   }
 
   /** The pulses of the ticks that are over. */
