@@ -34,6 +34,7 @@ mod reproduced;
 mod robust_command;
 mod serial_errors;
 mod shaken;
+mod site_at_length;
 mod site_bits;
 mod site_page;
 mod site_serial;

@@ -45,12 +45,14 @@ function checked(answer) {
   redesign();
 }
 
+// How the closed loop is disturbed in the run that is shown.
+const disturbed = () => ({ lean_rad: Number(byId('lean').value) / DEGREES, step_m: Number(byId('step').value) });
+
 function redesign() {
   for (const id of ['plots', 'gains', 'poles']) byId(id).classList.add('old');
   const toml = editor.value;
   tell('designing …');
-  const question = { ask: 'design', toml, lean_rad: Number(byId('lean').value) / DEGREES, step_m: Number(byId('step').value) };
-  designer.ask('design', question, (answer, ms) => {
+  designer.ask('design', { ask: 'design', toml, ...disturbed() }, (answer, ms) => {
     if (answer.failed !== undefined) return tell(answer.failed.why, true);
     designed(answer, ms);
     return designer.ask('poles', { ask: 'poles', toml }, (poles) => {
@@ -95,7 +97,7 @@ function showLoop() {
     ['position (m)', [{ name: 'cart', value: state(0), colour: curveColour(0) }, { name: 'set-point', value: (row) => row[1], colour: 'var(--limit)' }]],
     ['angles (°)', desk.sketch.lengths_m.map((_, link) => ({ name: `link ${link + 1}`, value: state(2 + 2 * link, DEGREES), colour: curveColour(link) }))],
     [desk.sketch.input, [{ name: 'applied', value: (row) => row[2], colour: curveColour(1) }]],
-  ].filter(([, curves]) => links > 0 || curves[0].name === 'applied');
+  ].filter(([, curves]) => links > 0 || curves[0]?.name === 'applied');
   byId('plots').replaceChildren(...plots.map(([title, curves]) => {
     const caption = element('figcaption', { textContent: title });
     for (const { name, colour } of curves) {
@@ -170,23 +172,16 @@ function save(name, text, type = 'text/plain') {
   setTimeout(() => URL.revokeObjectURL(address), 10e3);
 }
 
-// What `upright design` and `upright export` write.
+// What `upright design`, `upright export` and `upright simulate --csv` write.
 async function exported(kind) {
-  const answer = await designer.answerTo({ ask: kind, toml: editor.value });
+  const answer = await designer.answerTo({ ask: kind, toml: editor.value, law: byId('law').value, ...disturbed() });
   if (answer.failed !== undefined) tell(answer.failed.why, true);
   return answer.text ?? null;
 }
 
-async function saveExported(kind, name) {
+async function saveExported(kind, name, type) {
   const text = await exported(kind);
-  if (text !== null) save(name, text);
-}
-
-function csvOfRun() {
-  const { rows } = chosen().run;
-  const states = rows[0][3].map((_, state) => `state${state}`);
-  const lines = rows.map(([t, setpoint, force, state]) => [t, setpoint, force, ...state].join());
-  return `${['t_s', 'setpoint_m', desk.sketch.input, ...states].join()}\n${lines.join('\n')}\n`;
+  if (text !== null) save(name, text, type);
 }
 
 // The stored motions of the example that the rig began as; they are used if it has not changed.
@@ -242,7 +237,7 @@ function listen() {
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
   byId('save-header').addEventListener('click', () => saveExported('header', 'controller.h'));
-  byId('save-csv').addEventListener('click', () => save('run.csv', csvOfRun(), 'text/csv'));
+  byId('save-csv').addEventListener('click', () => saveExported('csv', 'run.csv', 'text/csv'));
   byId('link').addEventListener('click', async () => {
     history.replaceState(null, '', linkToRig());
     await navigator.clipboard?.writeText(location.href).catch(() => {});

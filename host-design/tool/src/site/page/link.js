@@ -15,8 +15,7 @@ class Thread {
     this.worker.onmessage = ({ data }) => {
       const { take } = this.asked;
       this.asked = null;
-      take(data.answer, data.ms);
-      this.next();
+      try { take(data.answer, data.ms); } finally { this.next(); }
     };
     this.ready = new Promise((take) => { this.asked = { take }; });
     this.worker.postMessage({ id: 0, module });

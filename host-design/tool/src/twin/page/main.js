@@ -9,7 +9,7 @@ import { Controls } from './controls.js';
 import { Drawers } from './drawers.js';
 
 const byId = (id) => document.getElementById(id);
-const MOTOR_MS = 150; // time between two texts of the motor's force
+const MOTOR_MS = 150; // time between two texts of what the motor does
 const KEPT = 'upright scopes'; // name in the tab's store
 
 const seen = { you: null, picture: null, telemetry: null, frames: 0, step: 0, since: -MOTOR_MS };
@@ -92,7 +92,7 @@ function motor(latest, force) {
   else if (performance.now() - seen.since < MOTOR_MS) return;
   seen.since = performance.now();
   byId('motor').textContent = { fault: '✕ Motor off: fault', off: '○ Motor off' }[state]
-    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} N ${force < 0 ? '←' : '→'}`;
+    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} ${hello.input[1]} ${force < 0 ? '←' : '→'}`;
 }
 
 function frame() {
