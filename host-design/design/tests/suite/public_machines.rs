@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use upright_design::design::{Design, design};
-use upright_design::rig::Rig;
+use upright_design::rig::{PlantDescription, Rig};
 
 const PAGE: &str = include_str!("../../../../docs/coming-from-matlab.md");
 
@@ -44,7 +44,12 @@ fn ctms() -> String {
 }
 
 fn rig_file(name: &str) -> String {
-    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name)).unwrap()
+    file("rigs", name)
+}
+
+fn file(folder: &str, name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(folder).join(name))
+        .unwrap()
 }
 
 /// The text with these lines more in `[lqr]`.
@@ -109,4 +114,43 @@ fn a_cross_weight_enters_as_in_the_closed_form_of_a_scalar_plant() {
          cross_weights = [0.5]\n",
     );
     assert_close(&k, &[1.0 + 3f64.sqrt()], 1e-15);
+}
+
+#[test]
+fn a_two_wheeled_robot_has_the_gains_of_its_program() {
+    let text = file("examples", "two-wheeler.toml");
+    let model = |rig: &Rig| match &rig.plant {
+        PlantDescription::Model(model) => (model.a.clone(), model.b.clone()),
+        PlantDescription::Chain(_) => panic!("a chain"),
+    };
+    let (a, b) = model(&Rig::from_toml(&text, Path::new("test.toml")).unwrap());
+    // Inertias e, damping and torques of motors and wheels, as the file's first lines give them.
+    let (wheel, radius, body, height, rotor) = (0.03, 0.04, 0.6, 0.072, 1e-5);
+    let (torque, back_emf, resistance) = (0.317, 0.468, 6.69);
+    let [e11, e12, e22] = [
+        (2.0 * wheel + body) * radius * radius + wheel * radius * radius + 2.0 * rotor,
+        body * height * radius - 2.0 * rotor,
+        4.0 / 3.0 * body * height * height + 2.0 * rotor,
+    ];
+    let determinant = e11 * e22 - e12 * e12;
+    let solved = |[x, y]: [f64; 2]| [(e22 * x - e12 * y) / determinant, (e11 * y - e12 * x) / determinant];
+    let drive = 2.0 * torque / resistance;
+    let drag = 2.0 * (torque * back_emf / resistance + 0.0022);
+    let columns = [[-drag, drag], [0.0, body * 9.81 * height], [drag, -drag], [drive, -drive]].map(solved);
+    for (row, from) in [1, 3].into_iter().enumerate() {
+        let found = [a[from][1], a[from][2], a[from][3], b[from]];
+        assert_close(&found, &columns.map(|column| column[row]), 1e-8);
+    }
+    let with_integral = designed(&text).continuous.integral.unwrap();
+    // The second one before its author multiplied it by 0.85.
+    assert_close(with_integral.k.entries(), &[-0.8351, -1.0995 / 0.85, -34.1896, -2.8141, -0.4472], 6e-5);
+}
+
+#[test]
+fn a_pendulum_with_a_reaction_wheel_has_the_gains_of_its_program() {
+    let text = file("examples", "reaction-wheel.toml");
+    let program = [-440.8258, -56.9627, -0.21268];
+    let [continuous, sum] = gains(&text);
+    assert_close(&sum, &program, 3e-5);
+    assert!(continuous.iter().zip(&program).all(|(x, y)| (x / y - 1.0).abs() > 0.3), "{continuous:?}");
 }

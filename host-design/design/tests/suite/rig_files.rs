@@ -128,10 +128,10 @@ fn torque_and_back_emf_constants_may_differ() {
     close(lossy.volts_per_speed(), 14.35);
 }
 
-/// v' = -a v - c sign(v) + b V, with a = 13.2 1/s, c = 0.9 m/s², b = 0.925 m/(s² V), and 1.2 kg in motion.
+/// v' = -a v - c sign(v) + b V with the a, b and c that github.com/zjor/inverted-pendulum found, and 0.5 kg in motion.
 #[test]
 fn a_motor_that_is_known_by_its_motion_is_described_by_one_ohm_and_one_metre() {
-    let (a, b, c, mass) = (13.2, 0.925, 0.9, 1.2);
+    let (a, b, c, mass) = (35.98, 2.22, 2.79, 0.5);
     let text = format!(
         "{MINIMAL}[actuator]\nresistance_ohm = 1\npulley_radius_m = 1\ntorque_constant_n_m_per_a = {}\n\
          back_emf_constant_v_s_per_rad = {}\ndead_zone_v = {}\nsupply_v = 12\n",
@@ -145,6 +145,10 @@ fn a_motor_that_is_known_by_its_motion_is_described_by_one_ohm_and_one_metre() {
         let wanted = mass * (b * duty * 12.0 - a * speed - c * f64::signum(duty));
         assert!((plant.force(duty, speed) - wanted).abs() < 1e-12, "duty {duty} at {speed} m/s");
     }
+    let close = |x: f64, wanted: f64| assert!((x / wanted - 1.0).abs() < 5e-5, "{x} instead of {wanted}");
+    close(motor.stall_force_n(), 13.32);
+    close(plant.force(1.0, 0.0), 11.925);
+    close(motor.volts_per_speed(), 16.207);
 }
 
 #[test]

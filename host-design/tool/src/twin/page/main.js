@@ -92,7 +92,7 @@ function motor(latest, force) {
   else if (performance.now() - seen.since < MOTOR_MS) return;
   seen.since = performance.now();
   byId('motor').textContent = { fault: '✕ Motor off: fault', off: '○ Motor off' }[state]
-    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} ${hello.input[1]} ${force < 0 ? '←' : '→'}`;
+    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} ${hello.input[1]}`;
 }
 
 function frame() {

@@ -282,7 +282,7 @@ export class Scopes {
     draw.font = '12px system-ui, sans-serif';
     draw.lineWidth = 1;
     draw.textAlign = 'right';
-    const step = niceStep((high - low) / 3);
+    const step = niceStep((high - low) / 5);
     for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
       across(value);
       draw.fillText(short(value), MARGIN.left - 6, y(value) + 4);
