@@ -34,9 +34,7 @@ pub(crate) fn of(rig: &Rig) -> Value {
 fn fields(rig: &Rig) -> Vec<Value> {
     let mut fields = Vec::new();
     let mut field = |key: &str, label: &str, unit: &str, value: Option<f64>| {
-        fields.extend(
-            value.map(|value| json!({ "key": key, "label": label, "unit": unit, "value": value })),
-        );
+        fields.extend(value.map(|value| json!({ "key": key, "label": label, "unit": unit, "value": value })));
     };
     if let PlantDescription::Chain(chain) = &rig.plant {
         // A drive that imposes the cart's acceleration does not care for its mass.
@@ -51,7 +49,9 @@ fn fields(rig: &Rig) -> Vec<Value> {
                 Some(LinkEncoder::CountsPerRev(counts)) => {
                     of_link("encoder_counts_per_rev", "sensor", "counts/rev", Some(counts));
                 }
-                Some(LinkEncoder::StepRad(step)) => of_link("encoder_step_rad", "sensor", "rad/count", Some(step)),
+                Some(LinkEncoder::StepRad(step)) => {
+                    of_link("encoder_step_rad", "sensor", "rad/count", Some(step))
+                }
                 None => {}
             }
         }
@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn each_field_is_a_key_of_the_file_with_its_value() {
-        for (name, count) in [("single-stepper", 8), ("quadruple-paper", 16), ("quadruple-paper-printed", 1)] {
+        for (name, count) in [("single-stepper", 8), ("quadruple-paper", 16), ("quadruple-paper-printed", 1)]
+        {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
             let toml = std::fs::read_to_string(&file).unwrap();
             let rig = Rig::from_toml(&toml, &file).unwrap();

@@ -36,6 +36,7 @@ mod serial_errors;
 mod shaken;
 mod site_at_length;
 mod site_bits;
+mod site_pace;
 mod site_page;
 mod site_serial;
 mod site_shown;

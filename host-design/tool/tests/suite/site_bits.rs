@@ -69,7 +69,8 @@ fn compared() -> &'static Compared {
         let rigs = rigs();
         let ask = |(_, toml, motions): &(String, String, Option<String>), rounding: &str, ticks: u32| json!({ "ask": "fingerprint", "toml": toml, "motions": motions, "rounding": rounding, "ticks": ticks });
         let mut questions: Vec<Value> = rigs.iter().map(|rig| ask(rig, "as-written", TICKS)).collect();
-        questions.extend(["as-written", "fused", "other-order"].map(|rounding| ask(&rigs[0], rounding, 2000)));
+        questions
+            .extend(["as-written", "fused", "other-order"].map(|rounding| ask(&rigs[0], rounding, 2000)));
         let here = upright_design::parallel::map(0..questions.len(), |number| -> Value {
             // The same question for all of the short runs: on this computer, nothing is planted.
             let number = number.min(rigs.len());
@@ -90,7 +91,10 @@ impl Compared {
                 assert!(NO_FIRMWARE.contains(&name.as_str()), "{name}: {there}");
                 continue;
             }
-            assert!(there["ticks"][0].as_u64() > Some(20_000) && there["fault"].is_string(), "{name}: {there}");
+            assert!(
+                there["ticks"][0].as_u64() > Some(20_000) && there["fault"].is_string(),
+                "{name}: {there}"
+            );
             let moves = [1, 2].map(|motion| there["ticks"][motion].as_u64() > Some(0));
             assert_eq!(moves, [motions.is_some(); 2], "{name}: {there}");
         }
@@ -118,7 +122,7 @@ fn tables_and_runs_of_all_rigs_have_the_same_bits_in_the_page() {
     let compared = compared();
     browser.value(&format!(
         "{{ window.found = []; \
-         (async () => {{ for (const question of {}) found.push(await upright.ask(question)); }})(); }}",
+         (async () => {{ for (const question of {}) found.push(await upright.ask(question)); }})(); 0; }}",
         json!(compared.questions)
     ));
     let is_done = format!("found.length === {}", compared.questions.len());
@@ -133,7 +137,9 @@ fn tables_and_runs_of_all_rigs_have_the_same_bits_in_the_page() {
         ));
         until_designed(
             &mut browser,
-            &format!("upright.desk.design.rig === '{name}' && document.getElementById('verdict').textContent"),
+            &format!(
+                "upright.desk.design.rig === '{name}' && document.getElementById('verdict').textContent"
+            ),
         );
         let verdict = browser.value("document.getElementById('verdict').textContent");
         assert!(verdict.as_str().unwrap().starts_with("survives"), "{name}: {verdict}");

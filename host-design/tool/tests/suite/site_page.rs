@@ -62,12 +62,15 @@ pub(crate) fn opened_in(width: u32) -> Option<(Browser, tempfile::TempDir)> {
     let text = page(&module().unwrap(), &examples.unwrap(), &lessons.unwrap());
     std::fs::write(&file, &text).unwrap();
     let compressed = miniz_oxide::deflate::compress_to_vec(text.as_bytes(), 9).len();
-    eprintln!("the page has {} bytes, {compressed} compressed", text.len());
+    eprintln!("page: {} bytes, {compressed} compressed", text.len());
     assert!(compressed < COMPRESSED, "{compressed} bytes");
     let begin = Instant::now();
     browser.open(&file, width, "light", "screen");
     until(&mut browser, "upright.desk.design && upright.desk.poles");
-    eprintln!("gains and poles of four links after {:.2} s", begin.elapsed().as_secs_f64());
+    eprintln!(
+        "page: opened, with gains and poles of four links, after {:.2} s",
+        begin.elapsed().as_secs_f64()
+    );
     Some((browser, folder))
 }
 

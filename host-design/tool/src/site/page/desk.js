@@ -192,16 +192,14 @@ function motions() {
 
 // The rig in the address, behind the mark that is never sent to a server.
 function linkToRig() {
-  const bytes = new TextEncoder().encode(editor.value);
-  const code = btoa(String.fromCharCode(...bytes)).replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
+  const code = lettersOf(new TextEncoder().encode(editor.value)).replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
   return `${location.href.split('#')[0]}#rig=${code}`;
 }
 
 function rigOfLink() {
   const code = /^#rig=([A-Za-z0-9_-]+)$/.exec(location.hash)?.[1];
   if (code === undefined) return null;
-  const text = atob(code.replaceAll('-', '+').replaceAll('_', '/'));
-  return new TextDecoder().decode(Uint8Array.from(text, (letter) => letter.charCodeAt(0)));
+  return new TextDecoder().decode(bytesOfLetters(code.replaceAll('-', '+').replaceAll('_', '/')));
 }
 
 function listen() {
@@ -223,7 +221,7 @@ function listen() {
   byId('law').addEventListener('change', () => { showLoop(); showDesign(); trust.show(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
   byId('balance').addEventListener('click', () => {
-    twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked });
+    twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked, since_1970_s: Date.now() / 1e3 });
   });
   byId('connect').hidden = navigator.serial === undefined;
   byId('no-serial').hidden = navigator.serial !== undefined;
@@ -257,17 +255,12 @@ function open(text) {
   changed();
 }
 
-// The tab's store, from which a page that is loaded again takes its rig; null where the person forbids it.
-function kept() {
-  try { return sessionStorage; } catch { return null; }
-}
-
 async function begin() {
   listen();
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
-  editor.set(rigOfLink() ?? kept()?.getItem(KEPT) ?? first.toml);
-  addEventListener('pagehide', () => kept()?.setItem(KEPT, editor.value));
+  editor.set(rigOfLink() ?? store()?.getItem(KEPT) ?? first.toml);
+  addEventListener('pagehide', () => store()?.setItem(KEPT, editor.value));
   const module = bytesOf('module');
   checker = new Thread(module);
   designer = new Thread(module);
@@ -279,6 +272,7 @@ async function begin() {
   };
   new Lessons(begins, (question) => designer.answerTo(question));
   changed();
+  twin.goOn(editor.value);
 }
 
 // For tests, and for the curious.

@@ -69,10 +69,8 @@ const witness = new Witness();
 const controls = new Controls(ask, wish);
 const drawers = new Drawers((what) => controls.machine(what));
 
-// A page that is loaded again shows the curves of the page before: the address is that of the same run. A run inside
-// a page ends with that page.
+// A page that is loaded again shows the curves of the page before: the address is that of the same run.
 function remember() {
-  if (location.protocol === 'about:') return;
   let store = null;
   try { store = sessionStorage; } catch { return; } // forbidden by the person
   const kept = store.getItem(KEPT);
