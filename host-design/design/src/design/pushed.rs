@@ -115,7 +115,7 @@ struct UnitPush {
 impl UnitPush {
     fn new(held: &Matrix<f64>, pushed_loop: &PushedLoop<'_>, kalman: &Kalman<f64>) -> Self {
         let rig = pushed_loop.rig;
-        let mut predicted = Predicted::new(pushed_loop, kalman);
+        let mut predicted = PredictionError::new(pushed_loop, kalman);
         let response = (0..ticks(rig, DURATIONS_S[DURATIONS_S.len() - 1] + AFTER_S)).map(|_| {
             predicted.see();
             predicted.pass();
@@ -127,7 +127,7 @@ impl UnitPush {
 }
 
 /// The error of the prediction, tick by tick.
-struct Predicted<'a> {
+struct PredictionError<'a> {
     ad: &'a Matrix<f64>,
     l_filter: &'a Matrix<f64>,
     measured: Vec<usize>,
@@ -139,7 +139,7 @@ struct Predicted<'a> {
     corrected: Vec<f64>,
 }
 
-impl<'a> Predicted<'a> {
+impl<'a> PredictionError<'a> {
     /// No error.
     fn new(pushed_loop: &PushedLoop<'a>, kalman: &'a Kalman<f64>) -> Self {
         let (ad, l_filter) = (&pushed_loop.design.ad, &kalman.l_filter);
@@ -166,8 +166,8 @@ impl<'a> Predicted<'a> {
 
     /// What a push changes in a tick.
     fn push(&mut self, change: &[f64]) {
-        for i in 0..self.error.len() {
-            self.error[i] += change[i];
+        for (error, change) in self.error.iter_mut().zip(change) {
+            *error += change;
         }
     }
 }
@@ -249,7 +249,7 @@ impl PushedLoop<'_> {
         healthy: f64,
     ) -> Vec<f64> {
         let held: Vec<f64> = push.held.iter().map(|held| held * force_n).collect();
-        let mut predicted = Predicted::new(self, kalman);
+        let mut predicted = PredictionError::new(self, kalman);
         let mut largest = vec![0.0f64; predicted.seen.len()];
         let mut last = vec![[0.0f64; IN_A_ROW as usize]; predicted.seen.len()];
         let (mut accepted, mut rejected) = (0.0f64, 0);

@@ -231,9 +231,9 @@ impl<R: Real> Matrix<R> {
     /// Writes the product with the column `entries` into `product`: the bits of `*`, without new memory.
     ///
     /// # Panics
-    /// If `entries` is shorter than a row, or `product` than a column.
+    /// If `entries` is shorter than a row, or `product` longer than a column.
     pub fn times_column(&self, entries: &[R], product: &mut [R]) {
-        for i in 0..self.rows {
+        for (i, of_row) in product.iter_mut().enumerate() {
             let row = self.row(i);
             let entries = &entries[..row.len()];
             let mut sum = R::zero();
@@ -242,7 +242,7 @@ impl<R: Real> Matrix<R> {
                     sum = entries[k].times(&row[k]) + &sum;
                 }
             }
-            product[i] = sum;
+            *of_row = sum;
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The page's module computes the same bits as this computer, in Node and in the page.
 //!
-//! Needs Node, Chromium, a compiler for WebAssembly, and minutes to compile, so the tests run only where `UPRIGHT_REQUIRE_WASM=1`
-//! is set.
+//! Needs Node, Chromium, a compiler for WebAssembly, and minutes to compile, so the tests run only where
+//! `UPRIGHT_REQUIRE_WASM=1` is set.
 
 use std::path::Path;
 use std::process::Command;
@@ -57,8 +57,8 @@ pub(crate) fn in_node(questions: &[Value]) -> Vec<Value> {
 /// What is asked of all machines, and the answers of this computer.
 struct Compared {
     rigs: Vec<(String, String, Option<String>)>,
-    /// The table and run of each rig; then three short runs of the first one, with one operation of the second and third
-    /// rounded as another compiler might.
+    /// The table and run of each rig; then three short runs of the first one, with one operation of the second and
+    /// third rounded as another compiler might.
     questions: Vec<Value>,
     here: Vec<Value>,
 }

@@ -9,11 +9,11 @@ use upright_page::Desk;
 
 use crate::site_page::{opened, root};
 
-/// Time of this library for the design and closed loop of four links on two free cores of 2023 (s).
-const USUAL_S: f64 = 0.25;
+/// On a machine that is slow or busy, the page may take this many times as long as the library itself.
+const SLOWER: f64 = 4.0;
 
-/// Moves a weight four times. For each: time to the gains with their certificate and the closed loop, to the poles after
-/// them, for the closed loop alone, and the longest time in which the page did nothing else (ms).
+/// Moves a weight four times. For each: time to the gains with their certificate and the closed loop, from there to the
+/// poles, for the closed loop alone, and the longest pause of the page (ms).
 const MOVED: &str = "(async () => {
     const weight = document.getElementById('weight-lqr.force_weight');
     const all = [];
@@ -69,10 +69,9 @@ fn gains_closed_loop_and_poles_follow_a_weight_within_a_second_and_the_page_stay
         poles / 1e3,
         pause / 1e3
     );
-    // A machine that is slower, or busy, takes longer.
-    let slowness = (here_s / USUAL_S).max(1.0);
-    assert!(first_s < 2.0 * slowness, "{first_s} s, here {here_s} s");
-    assert!(designed < 1e3 * slowness, "{moved:?} ms, here {here_s} s");
+    let most_s = |wanted_s: f64| wanted_s.max(SLOWER * here_s);
+    assert!(first_s < most_s(2.0), "{first_s} s, here {here_s} s");
+    assert!(designed / 1e3 < most_s(1.0), "{moved:?} ms, here {here_s} s");
     assert!(pause < 0.5 * designed, "{moved:?} ms");
     // Negative control: what the page computes itself makes it pause.
     let own = "(() => { const begin = performance.now(); while (performance.now() < begin + 300); })()";

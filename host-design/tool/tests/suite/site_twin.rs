@@ -106,9 +106,8 @@ fn unlike(csv: &str, drawn: &[Value]) -> Option<String> {
     assert_eq!(names.by_ref().take(10).last(), Some("estimate9"));
     let is_drawn = |row: &&str| {
         let cells: Vec<&str> = row.split(',').collect();
-        let Some(telemetry) = drawn.iter().find(|telemetry| telemetry["tick"].to_string() == cells[0]) else {
-            return false;
-        };
+        let tick: u64 = cells[0].parse().unwrap();
+        let Some(telemetry) = drawn.iter().find(|telemetry| telemetry["tick"] == tick) else { return false };
         let numbers = |name: &str| telemetry[name].as_array().unwrap().clone();
         let scalars = ["setpoint_m", "requested_n", "applied_n", "drive"].map(|name| telemetry[name].clone());
         let lists = [numbers("counts"), numbers("estimate"), numbers("innovation")].concat();
