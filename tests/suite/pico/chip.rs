@@ -31,6 +31,10 @@ pub(super) struct Chip {
     answers: BufReader<ChildStdout>,
 }
 
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
 fn harness() -> PathBuf {
     repository().join("boards/rp2040/harness")
 }
@@ -75,8 +79,6 @@ impl Chip {
         at: usize,
         mut act: impl FnMut(&mut Self),
     ) -> Vec<Answer> {
-        let hexadecimal =
-            |bytes: &[u8]| bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
         // The host's counters have 32 and 16 bits, the chip's have 32.
         let mut counts: Vec<i64> = Vec::new();
         let mut last: Vec<u32> = Vec::new();
@@ -116,6 +118,24 @@ impl Chip {
         opened["disabled"].as_u64().unwrap_or_else(|| panic!("{opened}")) as u32
     }
 
+    /// Calls a function of the image with each pair of numbers; returns its results and its most cycles.
+    pub(super) fn call(&mut self, address: u32, pairs: &[(f32, f32)]) -> (Vec<f32>, u32) {
+        let words: Vec<u8> = pairs
+            .iter()
+            .flat_map(|(first, second)| [first, second])
+            .flat_map(|word| word.to_le_bytes())
+            .collect();
+        let called = self.ask(&json!({ "call": address, "pairs": hexadecimal(&words) }));
+        let results = bytes(&called["results"]);
+        let results = results.chunks(4).map(|word| f32::from_le_bytes(word.try_into().unwrap())).collect();
+        (results, called["cycles"].as_u64().unwrap() as u32)
+    }
+
+    /// Replaces the first such instruction of a function.
+    pub(super) fn replace(&mut self, function: u32, old: u16, new: u16) {
+        self.ask(&json!({ "replace": [function, old, new] }));
+    }
+
     /// Stops the chip's ticks; returns the cycles until the power stage is disabled, and until the watchdog resets the
     /// chip.
     pub(super) fn stop_ticks(&mut self, limit: u32) -> [u32; 2] {
@@ -124,18 +144,21 @@ impl Chip {
     }
 }
 
+fn bytes(digits: &Value) -> Vec<u8> {
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.as_str().unwrap().as_bytes().chunks(2).map(byte).collect()
+}
+
 fn answer(object: &Value) -> Answer {
     let number = |name: &str| object[name].as_u64().unwrap() as u32;
     let flag = |name: &str| object[name].as_bool().unwrap();
-    let digits = object["sent"].as_str().unwrap().as_bytes();
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
     Answer {
         level: number("level"),
         positive: flag("positive"),
         enabled: flag("enabled"),
         cycles: number("cycles"),
         stack: number("stack"),
-        sent: digits.chunks(2).map(byte).collect(),
+        sent: bytes(&object["sent"]),
     }
 }
 

@@ -101,6 +101,16 @@ pub(crate) fn recorded<D: FnMut(&mut Pins)>(
     scenario: &Scenario,
     defect: Option<(State, usize, D)>,
 ) -> Recorded {
+    // Ends early if the defect ends it.
+    recorded_while(table, defect, |target| drop(record(rig, table, scenario, target)))
+}
+
+/// Records what is done with the firmware, after a while in which the host sends nothing.
+pub(crate) fn recorded_while<D: FnMut(&mut Pins)>(
+    table: &TableValues,
+    defect: Option<(State, usize, D)>,
+    act: impl FnOnce(&mut dyn Target),
+) -> Recorded {
     let run = Recorded { pins: Vec::new(), outputs: Vec::new(), sent: Vec::new() };
     with_firmware(table, |target| {
         let mut tap = Tap { target, defect, client: Client::default(), since: None, run };
@@ -109,8 +119,7 @@ pub(crate) fn recorded<D: FnMut(&mut Pins)>(
         for _ in 0..WARM_UP_TICKS {
             tap.tick(&hanging, &mut Vec::new()).unwrap();
         }
-        // Ends early if the defect ends it.
-        let _ = record(rig, table, scenario, &mut tap);
+        act(&mut tap);
         tap.run
     })
     .unwrap()

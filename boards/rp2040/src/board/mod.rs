@@ -3,6 +3,8 @@
 
 #![allow(unsafe_code)]
 
+#[cfg(not(rp2350))]
+mod arithmetic;
 #[cfg_attr(not(rp2350), path = "rp2040.rs")]
 #[cfg_attr(rp2350, path = "rp2350.rs")]
 mod chip;
