@@ -276,5 +276,5 @@ async function begin() {
 }
 
 // For tests, and for the curious.
-globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
+globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, keptBytes: () => twin.kept?.kept.bytes.length ?? 0, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
 begin().catch((error) => tell(`this browser cannot compute the design: ${error.message}`, true));
