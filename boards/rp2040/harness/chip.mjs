@@ -1,8 +1,9 @@
 // A Raspberry Pi Pico in the emulator rp2040js, with the wires of docs/pico.md.
 //
-// Four things of the emulator are replaced here, because they do not follow the processor's clock, or take too long:
+// Some things of the emulator are replaced here, because they do not follow the processor's clock, or take too long:
 // - State machines run by the processor's cycles, not by a timer of the host. For speed, they stand still while nothing
 //   reaches them; the dead man's switch then counts the time that has passed.
+// - The state machine of step pulses has its own, divided clock (`steps.mjs`).
 // - There is no boot ROM: the program starts at its vector table, with the flash readable.
 // - An interrupt that is pending already when `wfi` begins ends it, as on the chip.
 // - The watchdog only reports: `watchdog` is called, and the caller ends the run.
@@ -11,6 +12,7 @@ import { RP2040, USBCDC } from 'rp2040js';
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { StepOutput } from './steps.mjs';
 
 const entry = dirname(fileURLToPath(import.meta.resolve('rp2040js')));
 const { SimulationClock } = await import(join(entry, 'clock/simulation-clock.js'));
@@ -55,6 +57,7 @@ export class Pico {
     this.settling = 0;
     this.skipped = 0;
     for (const block of this.chip.pio) this.#followTheProcessor(block);
+    this.steps = new StepOutput(this.chip.pio[0]);
     this.counts = Array(encoders).fill(0);
     this.targets = Array(encoders).fill(0);
     this.sinceEdge = 0;
@@ -73,7 +76,9 @@ export class Pico {
       block[access] = (offset, value) => {
         this.#catchUp();
         this.settling = SETTLING;
-        return plain(offset, value);
+        const result = plain(offset, value);
+        this.stepper = this.steps?.isUsed ? this.steps.machine : null;
+        return result;
       };
     }
   }
@@ -153,9 +158,10 @@ export class Pico {
   }
 
   #stepStateMachines(cycles) {
+    const { stepper } = this;
     for (let cycle = 0; cycle < cycles; cycle++) {
       for (const block of this.chip.pio) {
-        for (const machine of block.machines) if (machine.enabled) machine.step();
+        for (const machine of block.machines) if (machine.enabled && machine !== stepper) machine.step();
         block.checkChangedPins();
       }
     }
@@ -164,6 +170,7 @@ export class Pico {
   /** Time passes: for the timers, the encoders, and the state machines. */
   #pass(cycles) {
     this.clock.tick(cycles * CYCLE_NS);
+    if (this.stepper) this.steps.pass(cycles);
     const running = this.everyCycle ? cycles : Math.min(cycles, this.settling);
     this.#stepStateMachines(running);
     this.settling -= Math.min(running, this.settling);
@@ -183,7 +190,7 @@ export class Pico {
     }
     const next = Math.ceil(this.clock.nanosToNextAlarm / CYCLE_NS);
     const moving = this.targets.some((target, encoder) => target !== this.counts[encoder]);
-    const most = moving ? EDGE : this.settling > 0 ? this.settling : 1e5;
+    const most = moving ? EDGE : this.settling > 0 ? this.settling : this.everyCycle ? 100 : 1e5;
     this.#pass(Math.max(1, Math.min(next, most)));
   }
 

@@ -20,6 +20,7 @@ function stopTicks(limit) {
   const begin = pico.clock.nanos;
   const cycles = () => Math.round((pico.clock.nanos - begin) / 8);
   const stopped = { disabled: null, reset: null };
+  const first = pico.steps.now;
   // The emulator's watchdog would report again and again at the same time.
   pico.watchdog = () => { stopped.reset = cycles(); throw stopped; };
   pico.runEveryCycle();
@@ -32,6 +33,7 @@ function stopTicks(limit) {
   } catch (thrown) {
     if (thrown !== stopped) throw thrown;
   }
+  stopped.pulse = Math.round(pico.steps.rose - first);
   return stopped;
 }
 
@@ -81,11 +83,14 @@ for await (const line of createInterface({ input: process.stdin })) {
   // The chip counts from 0.
   first ??= tick.counts;
   pico.targets = tick.counts.map((count, encoder) => count - first[encoder]);
+  // The chip counts its own pulses.
+  if (pico.steps.isUsed) pico.targets[0] = 0;
   pico.contacts(tick);
   pico.supply(tick.supply);
   const cycles = pico.tick();
+  pico.steps.tick++;
   // Bytes that arrive during a tick are read after it.
   pico.receive(Buffer.from(tick.received, 'hex'));
-  console.log(JSON.stringify({ cycles, ...pico.outputs(), sent: Buffer.from(pico.takeSent()).toString('hex') }));
+  console.log(JSON.stringify({ cycles, ...pico.outputs(), trains: pico.steps.takeEnded(), sent: Buffer.from(pico.takeSent()).toString('hex') }));
 }
 process.exit(0);

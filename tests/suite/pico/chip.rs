@@ -23,6 +23,22 @@ pub(super) struct Answer {
     /// The most stack in use so far (bytes).
     pub(super) stack: u32,
     pub(super) sent: Vec<u8>,
+    pub(super) trains: Vec<Train>,
+}
+
+/// The pulses that the chip has given in a tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Train {
+    pub(super) tick: usize,
+    /// Their sum, by direction.
+    pub(super) pulses: i32,
+    /// Cycles to the first one, of the shortest and of the longest interval.
+    pub(super) first: u32,
+    pub(super) shortest: u32,
+    pub(super) longest: u32,
+    /// Cycles of the shortest pulse, and from a change of the direction to a pulse, at least.
+    pub(super) width: u32,
+    pub(super) setup: u32,
 }
 
 /// The emulator with an image.
@@ -137,16 +153,30 @@ impl Chip {
     }
 
     /// Stops the chip's ticks; returns the cycles until the power stage is disabled, and until the watchdog resets the
-    /// chip.
-    pub(super) fn stop_ticks(&mut self, limit: u32) -> [u32; 2] {
+    /// chip; and until the last step pulse.
+    pub(super) fn stop_ticks(&mut self, limit: u32) -> ([u32; 2], i64) {
         let stopped = self.ask(&json!({ "stopTicks": limit }));
-        ["disabled", "reset"].map(|name| stopped[name].as_u64().unwrap_or_else(|| panic!("{stopped}")) as u32)
+        let cycles = |name| stopped[name].as_u64().unwrap_or_else(|| panic!("{stopped}")) as u32;
+        (["disabled", "reset"].map(cycles), stopped["pulse"].as_i64().unwrap())
     }
 }
 
 fn bytes(digits: &Value) -> Vec<u8> {
     let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
     digits.as_str().unwrap().as_bytes().chunks(2).map(byte).collect()
+}
+
+fn train(object: &Value) -> Train {
+    let number = |name: &str| object[name].as_i64().unwrap();
+    Train {
+        tick: number("tick") as usize,
+        pulses: number("pulses") as i32,
+        first: number("first") as u32,
+        shortest: number("shortest") as u32,
+        longest: number("longest") as u32,
+        width: number("width") as u32,
+        setup: number("setup") as u32,
+    }
 }
 
 fn answer(object: &Value) -> Answer {
@@ -159,6 +189,7 @@ fn answer(object: &Value) -> Answer {
         cycles: number("cycles"),
         stack: number("stack"),
         sent: bytes(&object["sent"]),
+        trains: object["trains"].as_array().unwrap().iter().map(train).collect(),
     }
 }
 
