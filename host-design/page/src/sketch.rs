@@ -13,9 +13,10 @@ pub(crate) fn of(rig: &Rig) -> Value {
     };
     // Without a limit, JSON has null.
     let travel_m = travel_m.map(|end| end.filter(|end: &f64| end.is_finite()));
-    let input = match rig.actuator.input() {
-        CartInput::Force => "force (N)",
-        CartInput::Acceleration => "acceleration (m/s²)",
+    let input = match (&rig.plant, rig.actuator.input()) {
+        (PlantDescription::Model(_), _) => "input",
+        (_, CartInput::Force) => "force (N)",
+        (_, CartInput::Acceleration) => "acceleration (m/s²)",
     };
     json!({
         "input": input,

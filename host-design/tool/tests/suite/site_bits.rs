@@ -43,6 +43,11 @@ pub(crate) fn is_wanted(what: &str) -> bool {
 
 /// The answers of the module in Node.
 pub(crate) fn in_node(questions: &[Value]) -> Vec<Value> {
+    in_node_with_time(questions).0
+}
+
+/// The same, and the least processor time of an answer, as text.
+pub(crate) fn in_node_with_time(questions: &[Value]) -> (Vec<Value>, String) {
     let folder = tempfile::tempdir().unwrap();
     let (wasm, asked) = (folder.path().join("page.wasm"), folder.path().join("questions.json"));
     std::fs::write(&wasm, module().unwrap()).unwrap();
@@ -51,7 +56,8 @@ pub(crate) fn in_node(questions: &[Value]) -> Vec<Value> {
     let output = Command::new("node").arg(script).args([&wasm, &asked]).output().expect("Node is installed");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let answers: Vec<String> = serde_json::from_slice(&output.stdout).unwrap();
-    answers.iter().map(|answer| serde_json::from_str(answer).unwrap()).collect()
+    let answers = answers.iter().map(|answer| serde_json::from_str(answer).unwrap()).collect();
+    (answers, String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
 /// What is asked of all machines, and the answers of this computer.

@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use upright_page::Desk;
 
+use crate::site_bits::in_node_with_time;
 use crate::site_page::{opened, root};
 
 /// On a machine that is slow or busy, the page may take this many times as long as the library itself.
@@ -38,18 +39,24 @@ const MOVED: &str = "(async () => {
     return all;
   })()";
 
-/// Shortest time of this computer for the same with other weights (s).
-fn here_s() -> f64 {
+/// Questions for the same with other weights.
+fn questions() -> Vec<Value> {
     let toml = std::fs::read_to_string(root().join("rigs/quadruple-paper.toml")).unwrap();
-    let once = |weight: i32| {
-        let toml = toml.replace("force_weight = 1\n", &format!("force_weight = {weight}\n"));
-        let design = json!({ "ask": "design", "toml": toml, "lean_rad": 0.005, "step_m": 0.1 });
+    let with = |weight: i32| toml.replace("force_weight = 1\n", &format!("force_weight = {weight}\n"));
+    (2..6)
+        .map(|weight| json!({ "ask": "design", "toml": with(weight), "lean_rad": 0.005, "step_m": 0.1 }))
+        .collect()
+}
+
+/// Shortest time of this computer for one of them (s).
+fn here_s() -> f64 {
+    let once = |design: Value| {
         let begin = Instant::now();
         let answer: Value = serde_json::from_str(&Desk::default().answer(&design.to_string())).unwrap();
         assert!(answer["laws"][0]["run"].is_object(), "{answer}");
         begin.elapsed().as_secs_f64()
     };
-    (2..6).map(once).fold(f64::INFINITY, f64::min)
+    questions().into_iter().map(once).fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -68,6 +75,10 @@ fn gains_closed_loop_and_poles_follow_a_weight_within_a_second_and_the_page_stay
         run / 1e3,
         poles / 1e3,
         pause / 1e3
+    );
+    let (_, processor) = in_node_with_time(&questions());
+    eprintln!(
+        "page: processor time of the module for gains, certificates and closed loop, in Node: {processor}"
     );
     let most_s = |wanted_s: f64| wanted_s.max(SLOWER * here_s);
     assert!(first_s < most_s(2.0), "{first_s} s, here {here_s} s");
