@@ -9,6 +9,10 @@ fn main() {
         Some(arm) if arm.starts_with("thumb") => "arm.ld",
         _ => "riscv.ld",
     };
+    println!("cargo::rustc-check-cfg=cfg(armv6m)");
+    if target.starts_with("thumbv6m") {
+        println!("cargo::rustc-cfg=armv6m");
+    }
     let folder = PathBuf::from(std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default()).join("memory");
     for script in [script, "sections.ld"] {
         println!("cargo::rustc-link-arg=-T{}", folder.join(script).display());

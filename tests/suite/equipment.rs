@@ -39,3 +39,24 @@ pub(crate) fn build_crate(name: &str, rig: &Rig, table: &TableValues) -> Result<
     }
     Err(BuildError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()))
 }
+
+#[cfg(unix)]
+mod tests {
+    use std::process::Command;
+    use std::time::Duration;
+
+    use upright_test_support::equipment::output_within;
+
+    #[test]
+    fn a_program_that_ends_in_time_gives_what_it_prints() {
+        let mut shell = Command::new("sh");
+        let output = output_within(shell.args(["-c", "echo done; exit 3"]), Duration::from_secs(60));
+        assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(3), &b"done\n"[..]));
+    }
+
+    #[test]
+    #[should_panic(expected = "takes more than 100ms")]
+    fn a_program_that_does_not_end_is_ended() {
+        output_within(Command::new("sleep").arg("60"), Duration::from_millis(100));
+    }
+}

@@ -19,6 +19,10 @@ global_asm!(
     main = sym crate::main,
 );
 
+// The arithmetic of the image for a Raspberry Pi Pico, so that it is compared with the host's, too.
+#[cfg(armv6m)]
+global_asm!(include_str!("../../rp2040/src/board/arithmetic.s"), options(raw));
+
 const CONTROL: *mut u32 = 0xe000_e010 as *mut u32;
 const RELOAD: *mut u32 = 0xe000_e014 as *mut u32;
 const CURRENT: *mut u32 = 0xe000_e018 as *mut u32;

@@ -1,8 +1,9 @@
 // A Raspberry Pi Pico in the emulator rp2040js, with the wires of docs/pico.md.
 //
-// Four things of the emulator are replaced here, because they do not follow the processor's clock, or take too long:
+// Some things of the emulator are replaced here, because they do not follow the processor's clock, or take too long:
 // - State machines run by the processor's cycles, not by a timer of the host. For speed, they stand still while nothing
 //   reaches them; the dead man's switch then counts the time that has passed.
+// - The state machine of step pulses has its own, divided clock (`steps.mjs`).
 // - There is no boot ROM: the program starts at its vector table, with the flash readable.
 // - An interrupt that is pending already when `wfi` begins ends it, as on the chip.
 // - The watchdog only reports: `watchdog` is called, and the caller ends the run.
@@ -11,6 +12,7 @@ import { RP2040, USBCDC } from 'rp2040js';
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { StepOutput } from './steps.mjs';
 
 const entry = dirname(fileURLToPath(import.meta.resolve('rp2040js')));
 const { SimulationClock } = await import(join(entry, 'clock/simulation-clock.js'));
@@ -21,6 +23,8 @@ const SYSTICK = 15;
 const SETTLING = 200;
 /** Cycles from one edge of an encoder to the next: the state machines need ten. */
 const EDGE = 12;
+/** Where a function returns to that the harness calls. */
+const RETURN = 0x20000000;
 /** Levels of phases A and B, in the order in which they follow each other while the count grows. */
 const PHASES = [[0, 0], [1, 0], [1, 1], [0, 1]];
 const PINS = { limitLow: 13, limitHigh: 14, stop: 15, fault: 16, direction: 11, enable: 12, led: 25 };
@@ -53,6 +57,7 @@ export class Pico {
     this.settling = 0;
     this.skipped = 0;
     for (const block of this.chip.pio) this.#followTheProcessor(block);
+    this.steps = new StepOutput(this.chip.pio[0]);
     this.counts = Array(encoders).fill(0);
     this.targets = Array(encoders).fill(0);
     this.sinceEdge = 0;
@@ -71,7 +76,9 @@ export class Pico {
       block[access] = (offset, value) => {
         this.#catchUp();
         this.settling = SETTLING;
-        return plain(offset, value);
+        const result = plain(offset, value);
+        this.stepper = this.steps?.isUsed ? this.steps.machine : null;
+        return result;
       };
     }
   }
@@ -151,9 +158,10 @@ export class Pico {
   }
 
   #stepStateMachines(cycles) {
+    const { stepper } = this;
     for (let cycle = 0; cycle < cycles; cycle++) {
       for (const block of this.chip.pio) {
-        for (const machine of block.machines) if (machine.enabled) machine.step();
+        for (const machine of block.machines) if (machine.enabled && machine !== stepper) machine.step();
         block.checkChangedPins();
       }
     }
@@ -162,6 +170,7 @@ export class Pico {
   /** Time passes: for the timers, the encoders, and the state machines. */
   #pass(cycles) {
     this.clock.tick(cycles * CYCLE_NS);
+    if (this.stepper) this.steps.pass(cycles);
     const running = this.everyCycle ? cycles : Math.min(cycles, this.settling);
     this.#stepStateMachines(running);
     this.settling -= Math.min(running, this.settling);
@@ -181,7 +190,7 @@ export class Pico {
     }
     const next = Math.ceil(this.clock.nanosToNextAlarm / CYCLE_NS);
     const moving = this.targets.some((target, encoder) => target !== this.counts[encoder]);
-    const most = moving ? EDGE : this.settling > 0 ? this.settling : 1e5;
+    const most = moving ? EDGE : this.settling > 0 ? this.settling : this.everyCycle ? 100 : 1e5;
     this.#pass(Math.max(1, Math.min(next, most)));
   }
 
@@ -210,6 +219,19 @@ export class Pico {
       led: !!(sio.gpioValue & (1 << PINS.led)),
       stack: this.chip.flashView.getUint32(0x100, true) - this.lowest,
     };
+  }
+
+  /** Calls a function of the image with two words; returns its result and its cycles. Nothing else happens meanwhile. */
+  call(address, first, second) {
+    const { core } = this;
+    core.PM = true;
+    core.registers[0] = first;
+    core.registers[1] = second;
+    core.LR = RETURN | 1;
+    core.PC = address;
+    let cycles = 0;
+    while (core.PC !== RETURN) cycles += core.executeInstruction();
+    return [core.registers[0] >>> 0, cycles];
   }
 
   /** From now on, the state machines never stand still. */

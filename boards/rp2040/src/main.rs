@@ -2,7 +2,7 @@
 //!
 //! | task | started by | priority | does |
 //! |---|---|---|---|
-//! | `tick` | SysTick, at the table's period | highest | inputs → supervisor → controller → motor, then the prediction |
+//! | `tick` | SysTick, at the table's period | highest | inputs → supervisor → controller → motor or pulses, then the prediction |
 //! | `idle` | every interrupt | lowest | bytes → commands, telemetry → bytes |
 //!
 //! The tasks share no locked resource, only single-producer, single-consumer queues.
@@ -21,10 +21,6 @@ const CYCLES_PER_TICK: u32 = {
     assert!(tick_us >= shortest && tick_us <= longest, "tick.period_s: the board cannot make this tick");
     (gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5) as u32
 };
-
-/// The board has pins for the duty cycle of a motor driver, none for step pulses.
-const _: () =
-    assert!(gains::TABLE.steps.is_none(), "kind = \"acceleration\": this board makes no step pulses");
 
 #[rtic::app(device = hal::pac, peripherals = true)]
 mod app {

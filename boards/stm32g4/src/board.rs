@@ -1,13 +1,13 @@
 //! The board: a NUCLEO-G474RE with the encoders of a cart and one link.
 
 use cortex_m::peripheral::DWT;
-use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::gpio::{self, Input};
 use embassy_stm32::peripherals::{ADC1, IWDG, PC0, TIM1, TIM2, TIM3};
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::SimplePwmChannel;
 use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{Peri, pac};
 use embassy_time::Instant;
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
@@ -37,6 +37,31 @@ pub(crate) struct Hardware {
     pub(crate) late_ticks: u8,
 }
 
+/// Lines of the chip that note edges: the emergency stop at PB2 opens, the power stage at PB10 reports a fault.
+const STOPPED: usize = 2;
+const FAULTY: usize = 10;
+
+/// Notes these edges, so that what is shorter than a tick is seen, too. No interrupt is enabled for them.
+pub(crate) fn note_edges() {
+    /// The port, in the registers that select it for four lines each.
+    const PORT_B: u8 = 1;
+    for line in [STOPPED, FAULTY] {
+        pac::SYSCFG.exticr(line / 4).modify(|ports| ports.set_exti(line % 4, PORT_B));
+        pac::EXTI.imr(0).modify(|lines| lines.set_line(line, true));
+    }
+    pac::EXTI.rtsr(0).modify(|lines| lines.set_line(STOPPED, true));
+    pac::EXTI.ftsr(0).modify(|lines| lines.set_line(FAULTY, true));
+}
+
+/// Whether there has been an edge since the last call.
+fn was_noted(line: usize) -> bool {
+    let was_noted = pac::EXTI.pr(0).read().line(line);
+    if was_noted {
+        pac::EXTI.pr(0).write(|lines| lines.set_line(line, true));
+    }
+    was_noted
+}
+
 /// Volts of the supply per step of the converter, from 3.3 V, behind 10 kΩ and 1 kΩ.
 const VOLTS_PER_STEP: f32 = 3.3 * 11.0 / 4096.0;
 
@@ -53,8 +78,8 @@ impl Board<SENSORS> for Hardware {
             contacts: Contacts {
                 limit_low: self.limit_low.is_high(),
                 limit_high: self.limit_high.is_high(),
-                emergency_stop: self.emergency_stop.is_high(),
-                driver_fault: self.driver_fault.is_low(),
+                emergency_stop: was_noted(STOPPED) | self.emergency_stop.is_high(),
+                driver_fault: was_noted(FAULTY) | self.driver_fault.is_low(),
                 overrun: self.late_ticks > 0,
                 clock_fault: false,
                 board_fault: false,

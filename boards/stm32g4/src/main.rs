@@ -126,6 +126,7 @@ fn set_up(chip: Peripherals) -> (Hardware, BufferedUart<'static>) {
         next_tick: Instant::now(),
         late_ticks: 0,
     };
+    board::note_edges();
     // The ST-Link's serial port.
     static SENT: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
     static RECEIVED: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);

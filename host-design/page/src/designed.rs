@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use upright::table::Law;
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::simulate::{Scenario, simulate};
+use upright_design::simulate::{Scenario, Summary, Trace, simulate};
 use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, NoTable, TableValues};
 
@@ -89,6 +89,16 @@ impl DeskDesign {
         }))
     }
 
+    /// Every tick of the run that is shown for the law with the name `law`, as `upright simulate --csv` writes it.
+    pub(crate) fn csv(&self, rig: &Rig, law: &str, run: &ShownRun) -> Result<String, PageRefusal> {
+        let table = self.table()?;
+        let law = table.laws.present().map(|(law, _)| law).find(|present| present.option() == law);
+        let (trace, _) = ran(rig, table, law.ok_or(PageRefusal::Law)?, run)?;
+        let mut bytes = Vec::new();
+        trace.write_csv(&mut bytes)?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
     /// The trust report after the step of this number.
     pub(crate) fn verify(&mut self, rig: &Rig, step: usize) -> Result<Value, PageRefusal> {
         let table = self.table.as_ref().map_err(Clone::clone)?;
@@ -111,13 +121,18 @@ fn gains(law: &Feedback<f64>) -> Value {
 }
 
 /// A run of the firmware's controller against the nonlinear rig.
-fn shown(rig: &Rig, table: &TableValues, law: Law, run: &ShownRun) -> Result<Value, PageRefusal> {
+fn ran(rig: &Rig, table: &TableValues, law: Law, run: &ShownRun) -> Result<(Trace, Summary), PageRefusal> {
     let mut scenario = Scenario { duration_s: RUN_S, step_m: run.step_m, ..Scenario::at_rest(rig, law) };
     match &rig.plant {
         PlantDescription::Chain(_) => scenario.start[2] = run.lean_rad,
         PlantDescription::Model(model) => scenario.start[model.output] = run.lean_rad,
     }
-    let (trace, summary) = simulate(rig, table, &scenario)?;
+    Ok(simulate(rig, table, &scenario)?)
+}
+
+/// The same, with the points that a page draws.
+fn shown(rig: &Rig, table: &TableValues, law: Law, run: &ShownRun) -> Result<Value, PageRefusal> {
+    let (trace, summary) = ran(rig, table, law, run)?;
     let samples = trace.samples();
     let every = samples.len().div_ceil(POINTS).max(1);
     let rows: Vec<Value> = samples

@@ -37,6 +37,12 @@ enum Asked {
     Set { key: String, value: String },
     /// The gains, and the closed loop in a run of the firmware's controller.
     Design(ShownRun),
+    /// That run, tick by tick, as `upright simulate --csv` writes it.
+    Csv {
+        law: String,
+        #[serde(flatten)]
+        run: ShownRun,
+    },
     /// The poles of the loops, which take as long as the gains.
     Poles,
     /// The trust report in short form, as far as its step of this number.
@@ -80,6 +86,10 @@ impl Desk {
                 Ok(json!({ "toml": text }))
             }
             Asked::Design(run) => self.designed(&question.toml, &rig)?.gains_and_run(&rig, run),
+            Asked::Csv { law, run } => {
+                let text = self.designed(&question.toml, &rig)?.csv(&rig, law, run)?;
+                Ok(json!({ "text": text }))
+            }
             Asked::Poles => self.designed(&question.toml, &rig)?.poles(&rig),
             &Asked::Verify { step } => self.designed(&question.toml, &rig)?.verify(&rig, step),
             Asked::Mark { exercise, answer } => exercise.marked(&question.toml, answer),

@@ -37,6 +37,10 @@ pub(crate) enum PageRefusal {
     Firmware(#[from] HarnessError),
     #[error(transparent)]
     ForceOnly(#[from] ForceOnly),
+    #[error("the design has no such law: choose one of the page")]
+    Law,
+    #[error(transparent)]
+    Csv(#[from] std::io::Error),
     #[error("no rig is under power: start one")]
     NoTwin,
     #[error("no board is connected: connect one")]

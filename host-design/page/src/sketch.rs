@@ -1,7 +1,7 @@
 //! What a page draws of a rig before it is designed.
 
 use serde_json::{Value, json};
-use upright_design::rig::{CartInput, PlantDescription, Rig};
+use upright_design::rig::{CartInput, LinkEncoder, PlantDescription, Rig};
 
 /// Names, lengths and travel; the weights that can be changed while one looks; values that no bench has.
 pub(crate) fn of(rig: &Rig) -> Value {
@@ -13,9 +13,10 @@ pub(crate) fn of(rig: &Rig) -> Value {
     };
     // Without a limit, JSON has null.
     let travel_m = travel_m.map(|end| end.filter(|end: &f64| end.is_finite()));
-    let input = match rig.actuator.input() {
-        CartInput::Force => "force (N)",
-        CartInput::Acceleration => "acceleration (m/s²)",
+    let input = match (&rig.plant, rig.actuator.input()) {
+        (PlantDescription::Model(_), _) => "input",
+        (_, CartInput::Force) => "force (N)",
+        (_, CartInput::Acceleration) => "acceleration (m/s²)",
     };
     json!({
         "input": input,
@@ -32,32 +33,73 @@ pub(crate) fn of(rig: &Rig) -> Value {
 
 /// The numbers that a page offers as fields: keys of the rig file, with label, unit and value.
 fn fields(rig: &Rig) -> Vec<Value> {
-    let field = |key: String, label: String, unit: &str, value: f64| json!({ "key": key, "label": label, "unit": unit, "value": value });
     let mut fields = Vec::new();
+    let mut field = |key: &str, label: &str, unit: &str, value: Option<f64>| {
+        fields.extend(value.map(|value| json!({ "key": key, "label": label, "unit": unit, "value": value })));
+    };
     if let PlantDescription::Chain(chain) = &rig.plant {
         // A drive that imposes the cart's acceleration does not care for its mass.
-        if let Some(mass_kg) = chain.cart.mass_kg {
-            fields.push(field("cart.mass_kg".to_owned(), "mass of the cart".to_owned(), "kg", mass_kg));
-        }
+        field("cart.mass_kg", "mass of the cart", "kg", chain.cart.mass_kg);
         for (number, link) in (1..).zip(&chain.links) {
-            fields.push(field(
-                format!("link[{number}].mass_kg"),
-                format!("mass of link {number}"),
-                "kg",
-                link.mass_kg,
-            ));
-            fields.push(field(
-                format!("link[{number}].length_m"),
-                format!("length of link {number}"),
-                "m",
-                link.length_m,
-            ));
+            let mut of_link = |name: &str, label: &str, unit: &str, value| {
+                field(&format!("link[{number}].{name}"), &format!("{label} of link {number}"), unit, value);
+            };
+            of_link("mass_kg", "mass", "kg", Some(link.mass_kg));
+            of_link("length_m", "length", "m", Some(link.length_m));
+            match link.encoder {
+                Some(LinkEncoder::CountsPerRev(counts)) => {
+                    of_link("encoder_counts_per_rev", "sensor", "counts/rev", Some(counts));
+                }
+                Some(LinkEncoder::StepRad(step)) => {
+                    of_link("encoder_step_rad", "sensor", "rad/count", Some(step))
+                }
+                None => {}
+            }
+        }
+        field("cart.encoder_step_m", "sensor of the cart", "m/count", chain.cart.encoder_step_m);
+    }
+    let actuator = &rig.actuator;
+    field("actuator.force_limit_n", "force limit", "N", actuator.force_limit_n);
+    field("actuator.supply_v", "supply", "V", actuator.motor.as_ref().map(|motor| motor.supply_v));
+    if let Some(drive) = &actuator.acceleration {
+        let limit = Some(drive.acceleration_limit_m_per_s2);
+        field("actuator.step_m", "travel per pulse", "m", Some(drive.step_m));
+        field("actuator.acceleration_limit_m_per_s2", "acceleration limit", "m/s²", limit);
+        field("actuator.speed_limit_m_per_s", "speed limit", "m/s", drive.speed_limit_m_per_s);
+        field("actuator.step_rate_limit_hz", "most pulses", "Hz", drive.step_rate_limit_hz);
+    }
+    field("tick.period_s", "tick", "s", Some(rig.tick.period_s));
+    fields
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use upright_design::rig::RigText;
+
+    use super::*;
+
+    #[test]
+    fn each_field_is_a_key_of_the_file_with_its_value() {
+        for (name, count) in [("single-stepper", 8), ("quadruple-paper", 16), ("quadruple-paper-printed", 1)]
+        {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
+            let toml = std::fs::read_to_string(&file).unwrap();
+            let rig = Rig::from_toml(&toml, &file).unwrap();
+            let fields = fields(&rig);
+            assert_eq!(fields.len(), count, "{name}: {fields:?}");
+            for field in &fields {
+                // The same value changes nothing; another one changes the rig.
+                let with = |value: f64| {
+                    let mut text = RigText::parse(&toml, &file).unwrap();
+                    text.set(field["key"].as_str().unwrap(), &value.to_string()).unwrap();
+                    Rig::from_toml(&text.to_string(), &file).unwrap()
+                };
+                let value = field["value"].as_f64().unwrap();
+                assert_eq!(with(value).hash(), rig.hash(), "{field}");
+                assert_ne!(with(2.0 * value).hash(), rig.hash(), "{field}");
+            }
         }
     }
-    if let Some(limit_n) = rig.actuator.force_limit_n {
-        let key = "actuator.force_limit_n".to_owned();
-        fields.push(field(key, "force limit".to_owned(), "N", limit_n));
-    }
-    fields.push(field("tick.period_s".to_owned(), "tick".to_owned(), "s", rig.tick.period_s));
-    fields
 }

@@ -2,7 +2,8 @@
 //! homes, checks signs, arms and balances with the outputs and the telemetry of the host.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
+use std::time::Duration;
 
 use crate::c_header::can_run_on_cortex_m;
 use crate::equipment::{build_crate, if_possible};
@@ -12,6 +13,7 @@ use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::harness::Pins;
 use upright_design::simulate::Scenario;
+use upright_test_support::equipment::output_within;
 use upright_test_support::repository;
 
 fn folder() -> PathBuf {
@@ -66,14 +68,17 @@ struct Answer {
     sent: Vec<u8>,
 }
 
+/// A run takes a second or two.
+const LONGEST: Duration = Duration::from_secs(60);
+
 /// Runs the program in QEMU; its exit status, and what it has written.
 fn run(program: &Path, wires: &[u8]) -> (Option<i32>, Vec<Answer>) {
     let folder = program.parent().unwrap();
     std::fs::write(folder.join("wires.in"), wires).unwrap();
     let mut qemu = Command::new("qemu-system-arm");
     qemu.args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-kernel"]);
-    qemu.arg(program).args(["-semihosting-config", "enable=on,target=native"]).stdin(Stdio::null());
-    let status = qemu.current_dir(folder).output().unwrap().status.code();
+    qemu.arg(program).args(["-semihosting-config", "enable=on,target=native"]);
+    let status = output_within(qemu.current_dir(folder), LONGEST).status.code();
     let bytes = std::fs::read(folder.join("wires.out")).unwrap_or_default();
     let (mut rest, mut answers) = (bytes.as_slice(), Vec::new());
     while let Some((head, after)) = rest.split_at_checked(14) {

@@ -3,7 +3,7 @@
 //! The compiler builds Rust's core library for each of them, so this takes minutes: it runs with `--ignored`.
 
 mod image;
-mod recorded;
+pub(crate) mod recorded;
 
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -113,7 +113,8 @@ fn at_rest(rig: &'static str) -> Replay {
     recorded(name, table, |tap| stand_still(rig, table, tap))
 }
 
-fn stand_still(rig: &Rig, table: &TableValues, target: &mut dyn Target) {
+/// Balances, and then nothing moves any more.
+pub(crate) fn stand_still(rig: &Rig, table: &TableValues, target: &mut dyn Target) {
     let mut harness = Harness::new(rig, table, &Scenario::at_rest(rig, Law::Lqr), target).unwrap();
     harness.raise(Some(0.0)).unwrap();
     let still = harness.inputs();

@@ -23,12 +23,32 @@ pub(super) struct Answer {
     /// The most stack in use so far (bytes).
     pub(super) stack: u32,
     pub(super) sent: Vec<u8>,
+    pub(super) trains: Vec<Train>,
+}
+
+/// The pulses that the chip has given in a tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Train {
+    pub(super) tick: usize,
+    /// Their sum, by direction.
+    pub(super) pulses: i32,
+    /// Cycles to the first one, of the shortest and of the longest interval.
+    pub(super) first: u32,
+    pub(super) shortest: u32,
+    pub(super) longest: u32,
+    /// Cycles of the shortest pulse, and from a change of the direction to a pulse, at least.
+    pub(super) width: u32,
+    pub(super) setup: u32,
 }
 
 /// The emulator with an image.
 pub(super) struct Chip {
     process: Child,
     answers: BufReader<ChildStdout>,
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 fn harness() -> PathBuf {
@@ -75,8 +95,6 @@ impl Chip {
         at: usize,
         mut act: impl FnMut(&mut Self),
     ) -> Vec<Answer> {
-        let hexadecimal =
-            |bytes: &[u8]| bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
         // The host's counters have 32 and 16 bits, the chip's have 32.
         let mut counts: Vec<i64> = Vec::new();
         let mut last: Vec<u32> = Vec::new();
@@ -116,26 +134,62 @@ impl Chip {
         opened["disabled"].as_u64().unwrap_or_else(|| panic!("{opened}")) as u32
     }
 
+    /// Calls a function of the image with each pair of numbers; returns its results and its most cycles.
+    pub(super) fn call(&mut self, address: u32, pairs: &[(f32, f32)]) -> (Vec<f32>, u32) {
+        let words: Vec<u8> = pairs
+            .iter()
+            .flat_map(|(first, second)| [first, second])
+            .flat_map(|word| word.to_le_bytes())
+            .collect();
+        let called = self.ask(&json!({ "call": address, "pairs": hexadecimal(&words) }));
+        let results = bytes(&called["results"]);
+        let results = results.chunks(4).map(|word| f32::from_le_bytes(word.try_into().unwrap())).collect();
+        (results, called["cycles"].as_u64().unwrap() as u32)
+    }
+
+    /// Replaces the first such instruction of a function.
+    pub(super) fn replace(&mut self, function: u32, old: u16, new: u16) {
+        self.ask(&json!({ "replace": [function, old, new] }));
+    }
+
     /// Stops the chip's ticks; returns the cycles until the power stage is disabled, and until the watchdog resets the
-    /// chip.
-    pub(super) fn stop_ticks(&mut self, limit: u32) -> [u32; 2] {
+    /// chip; and until the last step pulse.
+    pub(super) fn stop_ticks(&mut self, limit: u32) -> ([u32; 2], i64) {
         let stopped = self.ask(&json!({ "stopTicks": limit }));
-        ["disabled", "reset"].map(|name| stopped[name].as_u64().unwrap_or_else(|| panic!("{stopped}")) as u32)
+        let cycles = |name| stopped[name].as_u64().unwrap_or_else(|| panic!("{stopped}")) as u32;
+        (["disabled", "reset"].map(cycles), stopped["pulse"].as_i64().unwrap())
+    }
+}
+
+fn bytes(digits: &Value) -> Vec<u8> {
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.as_str().unwrap().as_bytes().chunks(2).map(byte).collect()
+}
+
+fn train(object: &Value) -> Train {
+    let number = |name: &str| object[name].as_i64().unwrap();
+    Train {
+        tick: number("tick") as usize,
+        pulses: number("pulses") as i32,
+        first: number("first") as u32,
+        shortest: number("shortest") as u32,
+        longest: number("longest") as u32,
+        width: number("width") as u32,
+        setup: number("setup") as u32,
     }
 }
 
 fn answer(object: &Value) -> Answer {
     let number = |name: &str| object[name].as_u64().unwrap() as u32;
     let flag = |name: &str| object[name].as_bool().unwrap();
-    let digits = object["sent"].as_str().unwrap().as_bytes();
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
     Answer {
         level: number("level"),
         positive: flag("positive"),
         enabled: flag("enabled"),
         cycles: number("cycles"),
         stack: number("stack"),
-        sent: digits.chunks(2).map(byte).collect(),
+        sent: bytes(&object["sent"]),
+        trains: object["trains"].as_array().unwrap().iter().map(train).collect(),
     }
 }
 

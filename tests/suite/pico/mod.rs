@@ -2,11 +2,14 @@
 //!
 //! It needs node and the emulator (`npm ci` in `boards/rp2040/harness`), and takes a minute: it runs with `--ignored`.
 
+mod arithmetic;
 mod chip;
 pub(crate) mod recorded;
+mod stepper;
 
 use self::chip::{Answer, Chip, uf2_with_motions};
-use self::recorded::{PERIOD, Recorded, WARM_UP_TICKS, recorded};
+use self::recorded::{PERIOD, Recorded, WARM_UP_TICKS, recorded, recorded_while};
+use crate::chips::recorded::stand_still;
 use crate::equipment::if_possible;
 use crate::published::{rig_and_table, rig_and_table_with_motions};
 use upright::board::Output;
@@ -15,7 +18,7 @@ use upright::table::Law;
 use upright_design::harness::Pins;
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::up_and_down;
-use upright_tool::image::{BuildError, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, PicoBoard, build_pico};
+use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, PicoBoard, build_pico};
 
 /// Stack of the image (bytes), as `boards/rp2040/image.x` has it.
 const STACK: u32 = 8192;
@@ -41,7 +44,9 @@ fn assert_equal(run: &Recorded, answers: &[Answer]) -> u32 {
     assert!((chip[0].tick as usize) < WARM_UP_TICKS);
     assert!(chip.len() + 2 >= host.len() && host.len() > 1000, "{} of {} messages", chip.len(), host.len());
     let different = host.iter().zip(&chip).position(|(host, chip)| host != chip);
-    assert_eq!(different, None, "first different telemetry");
+    if let Some(at) = different {
+        panic!("first different telemetry: {:?}, the host's: {:?}", chip[at], host[at]);
+    }
     let on: Vec<u32> = run
         .outputs
         .iter()
@@ -60,6 +65,13 @@ fn assert_equal(run: &Recorded, answers: &[Answer]) -> u32 {
     // The bound from the code is in docs/results/pico.md.
     assert!(stack < STACK / 8 * 5, "{stack} bytes of stack");
     most
+}
+
+/// What changes the pins, and when: from that many ticks after the first one in a state.
+type Defect = (State, usize, fn(&mut Pins));
+
+fn no_defect() -> Option<Defect> {
+    None
 }
 
 /// Balances from a small lean, after homing, sign check and motor test.
@@ -143,7 +155,7 @@ fn a_flood_on_the_bus_disturbs_nothing_and_the_motor_goes_off_when_ticks_stop() 
     let most = assert_equal(&run, &chip.replay(&run));
     assert!(most <= PICO_BALANCING_CYCLES[0], "{most} cycles");
     let tick = (rig.tick.period_s * 125e6) as u32;
-    let [disabled, reset] = chip.stop_ticks(5 * tick);
+    let ([disabled, reset], _) = chip.stop_ticks(5 * tick);
     println!("ticks stopped: disabled after {disabled} cycles, reset after {reset}");
     assert!((tick..=3 * tick).contains(&disabled) && (2 * tick..=4 * tick).contains(&reset));
 }
@@ -166,12 +178,37 @@ fn four_links_balance_in_half_of_the_period_until_an_encoder_wire_breaks() {
     );
 }
 
+/// Estimates become subnormal, which makes arithmetic slower.
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn four_links_at_rest_take_no_longer() {
+    let (rig, table) = rig_and_table_with_motions("quadruple-paper");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let run = recorded_while(table, no_defect(), |target| stand_still(rig, table, target));
+    let most = assert_equal(&run, &Chip::start(&uf2, table.sensors()).replay(&run));
+    assert!(
+        most <= PICO_BALANCING_CYCLES[3] && most < 68_750,
+        "{most} cycles: at most 55 % of a millisecond"
+    );
+}
+
+#[test]
+#[ignore = "runs an emulator of the chip"]
+fn four_links_are_raised_at_1_khz() {
+    let (rig, table) = rig_and_table_with_motions("quadruple-paper");
+    let Some(uf2) = uf2_with_motions(rig, table) else { return };
+    let scenario = up_and_down(rig, table, 0.5).unwrap();
+    let run = recorded(rig, table, &scenario, no_defect());
+    let most = assert_equal(&run, &Chip::start(&uf2, table.sensors()).replay(&run));
+    assert!(most <= PICO_MOTION_CYCLES[3], "{most} cycles");
+}
+
 #[test]
 #[ignore = "runs an emulator of the chip"]
 fn a_changed_table_keeps_the_motor_off() {
     let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
     let Some(uf2) = uf2_with_motions(rig, table) else { return };
-    let run = recorded(rig, table, &by_hand(rig, 0.1), None::<(State, usize, fn(&mut Pins))>);
+    let run = recorded(rig, table, &by_hand(rig, 0.1), no_defect());
     let mut bytes = std::fs::read(&uf2).unwrap();
     let gain = table.laws.lqr.as_ref().unwrap().k[0].to_le_bytes();
     let at = bytes.windows(4).position(|window| window == gain).unwrap();
@@ -187,37 +224,6 @@ fn a_changed_table_keeps_the_motor_off() {
     assert!(!telemetry.is_empty() && answers.iter().all(|answer| !answer.enabled));
     let table_fault = Some(upright::supervision::fault::Fault::Table);
     assert!(telemetry.iter().all(|at| at.fault == table_fault), "{:?}", telemetry[0].fault);
-}
-
-#[test]
-#[ignore = "builds the image"]
-fn a_rig_with_a_stepper_does_not_compile() {
-    let (rig, table) = rig_and_table("single-stepper");
-    let refused = build_pico(PicoBoard::Pico, rig, table);
-    if let Err(BuildError::Compiler(said)) = &refused {
-        return assert!(said.contains("kind = \"acceleration\": this board makes no step pulses"), "{said}");
-    }
-    assert!(if_possible(refused, "the image for a Pico").is_none(), "it compiles");
-}
-
-/// Whether this operation in an image is the compiler's, by the names in its ELF file. The ROM's take subnormals as 0,
-/// which only a rig at rest would show.
-fn is_compilers(elf: &[u8], operation: &str) -> bool {
-    let mut names = elf.split(|&byte| byte == 0).filter_map(|name| std::str::from_utf8(name).ok());
-    names.any(|name| name.contains("compiler_builtins") && name.ends_with(operation))
-}
-
-#[test]
-#[ignore = "builds the image"]
-fn sums_and_products_are_the_compilers_and_not_those_of_the_rom() {
-    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
-    let Some(uf2) = uf2_with_motions(rig, table) else { return };
-    let elf = std::fs::read(uf2.with_extension("elf")).unwrap();
-    for operation in ["__addsf3", "__mulsf3", "__divsf3"] {
-        assert!(is_compilers(&elf, operation), "{operation}");
-    }
-    // Negative control: what `rp2040-hal` puts in their place without its feature `disable-intrinsics`.
-    assert!(!is_compilers(b"\0_RNvNtCs_10rp2040_hal_10intrinsics8___addsf3\0", "__addsf3"));
 }
 
 #[test]

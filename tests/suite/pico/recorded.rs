@@ -56,6 +56,8 @@ struct Tap<'a, D> {
     defect: Option<(State, usize, D)>,
     client: Client,
     since: Option<usize>,
+    /// All pulses so far, for a drive that takes them: what the board counts, whatever a hand does with the cart.
+    pulses: Option<u32>,
     run: Recorded,
 }
 
@@ -63,6 +65,9 @@ impl<D: FnMut(&mut Pins)> Target for Tap<'_, D> {
     fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError> {
         let mut pins = pins.clone();
         pins.supply_v = steps(pins.supply_v) as f32 * VOLTS_PER_STEP;
+        if let Some(pulses) = self.pulses {
+            pins.raw_counts[0] = pulses;
+        }
         self.since = self.since.map(|ticks| ticks + 1);
         if let Some((_, from, change)) = &mut self.defect
             && self.since >= Some(*from)
@@ -71,6 +76,7 @@ impl<D: FnMut(&mut Pins)> Target for Tap<'_, D> {
         }
         let begin = serial.len();
         let output = self.target.tick(&pins, serial)?;
+        self.pulses = self.pulses.map(|pulses| pulses.wrapping_add_signed(output.pulses()));
         for &byte in &serial[begin..] {
             if let Some(Received::Telemetry(telemetry)) = self.client.receive(byte, Duration::ZERO)
                 && self.defect.as_ref().is_some_and(|defect| defect.0 == telemetry.state)
@@ -101,16 +107,32 @@ pub(crate) fn recorded<D: FnMut(&mut Pins)>(
     scenario: &Scenario,
     defect: Option<(State, usize, D)>,
 ) -> Recorded {
+    // Ends early if the defect ends it.
+    recorded_while(table, defect, |target| drop(record(rig, table, scenario, target)))
+}
+
+/// Records what is done with the firmware, after a while in which the host sends nothing.
+pub(crate) fn recorded_while<D: FnMut(&mut Pins)>(
+    table: &TableValues,
+    defect: Option<(State, usize, D)>,
+    act: impl FnOnce(&mut dyn Target),
+) -> Recorded {
     let run = Recorded { pins: Vec::new(), outputs: Vec::new(), sent: Vec::new() };
     with_firmware(table, |target| {
-        let mut tap = Tap { target, defect, client: Client::default(), since: None, run };
+        let mut tap = Tap {
+            target,
+            defect,
+            client: Client::default(),
+            since: None,
+            pulses: table.steps.map(|_| 0),
+            run,
+        };
         let supply_v = table.motor.map_or(0.0, |motor| motor.supply_v);
         let hanging = healthy(&vec![0; table.sensors()], supply_v);
         for _ in 0..WARM_UP_TICKS {
             tap.tick(&hanging, &mut Vec::new()).unwrap();
         }
-        // Ends early if the defect ends it.
-        let _ = record(rig, table, scenario, &mut tap);
+        act(&mut tap);
         tap.run
     })
     .unwrap()

@@ -4,12 +4,16 @@ use hal::pac::pio0::RegisterBlock;
 use hal::pac::{PIO0, PIO1};
 use upright::gains::SENSORS;
 
+use super::GIVES_PULSES;
 use super::pins::ENCODERS;
 use super::state_machine::{Course, load, run, start};
 
 const _: () = assert!(SENSORS <= ENCODERS.len(), "the board counts fewer encoders than the rig has");
 
-/// The length of the program: what follows it in PIO 1 is free.
+/// The first encoder: pulses tell where the cart is that they move.
+const FIRST: usize = GIVES_PULSES as usize;
+
+/// The length of the program: what follows it is free.
 pub(super) const LENGTH: usize = COUNT.len();
 
 /// Counts in Y. The first 16 words are a table of jumps by the last and the present level of both phases, so the
@@ -67,17 +71,20 @@ impl Encoders {
     pub(super) fn set_up(first: &PIO0, second: &PIO1) -> Self {
         load(first, 0, &COUNT);
         load(second, 0, &COUNT);
-        for (encoder, &phase_b) in ENCODERS.iter().enumerate().take(SENSORS) {
+        for (encoder, &phase_b) in ENCODERS.iter().enumerate().take(SENSORS).skip(FIRST) {
             let (pio, number) = machine(encoder);
-            let course = Course { begin: UPDATE.into(), repeat: UPDATE.into(), last: 23 };
+            let course = Course { begin: UPDATE.into(), repeat: UPDATE.into(), last: 23, divider: 1 };
             start(pio, number, course, (phase_b as u32) << 15, 0, &[ZERO]);
         }
         Self { have_stopped: false }
     }
 
-    /// The counts, as of now.
+    /// The counts, as of now; 0 for a cart without an encoder.
     pub(super) fn raw_counts(&mut self) -> [u32; SENSORS] {
         core::array::from_fn(|encoder| {
+            if encoder < FIRST {
+                return 0;
+            }
             let (pio, number) = machine(encoder);
             for _ in 0..OLD_COUNTS {
                 let _ = pio.rxf(number).read().bits();
@@ -90,7 +97,7 @@ impl Encoders {
 
     /// Whether a state machine has not counted in time, or is off.
     pub(super) fn have_stopped(&self) -> bool {
-        let in_first = (1 << SENSORS.min(4)) - 1;
+        let in_first = (1 << SENSORS.min(4)) - (1 << FIRST);
         let in_second = u32::from(SENSORS > 4);
         self.have_stopped | !run(machine(0).0, in_first) | !run(machine(4).0, in_second)
     }

@@ -44,7 +44,7 @@ impl Guard {
         load(&pio, ORIGIN.into(), &PROGRAM);
         let pins = 1 << 26 | (ENABLE as u32) << 5;
         let off = u32::from(OFF);
-        let course = Course { begin: off, repeat: BEGIN.into(), last: off + 1 };
+        let course = Course { begin: off, repeat: BEGIN.into(), last: off + 1, divider: 1 };
         start(&pio, NUMBER, course, pins, EMERGENCY_STOP, &OUTPUT);
         Self { pio }
     }

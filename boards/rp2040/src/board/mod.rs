@@ -3,6 +3,8 @@
 
 #![allow(unsafe_code)]
 
+#[cfg(not(rp2350))]
+mod arithmetic;
 #[cfg_attr(not(rp2350), path = "rp2040.rs")]
 #[cfg_attr(rp2350, path = "rp2350.rs")]
 mod chip;
@@ -12,6 +14,7 @@ mod guard;
 mod motor;
 mod pins;
 mod state_machine;
+mod steps;
 mod supply;
 mod usb;
 
@@ -23,18 +26,22 @@ use hal::pac::{Interrupt, Peripherals};
 use hal::watchdog::Watchdog;
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
-use upright::gains::SENSORS;
+use upright::gains::{SENSORS, TABLE};
 use upright::protocol::message::Start;
 
 use crate::CYCLES_PER_TICK;
 pub(crate) use chip::CLOCK_HZ;
 use encoders::Encoders;
 use motor::Motor;
+use steps::Steps;
 use supply::Supply;
 pub(crate) use usb::{UsbLine as SerialLine, UsbMemory};
 
 /// Shortest and longest tick (µs): a shorter one leaves no time for a controller, and SysTick has 24 bits.
 pub(crate) const TICK_US: [u32; 2] = [500, 100_000];
+
+/// Whether the drive of the gain table takes pulses.
+const GIVES_PULSES: bool = TABLE.steps.is_some();
 
 /// Crystal of both boards (Hz).
 const CRYSTAL_HZ: u32 = 12_000_000;
@@ -72,7 +79,8 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
         stop()
     };
     let encoders = Encoders::set_up(&device.PIO0, &device.PIO1);
-    let motor = Motor::set_up(&device.PWM, guard::Guard::set_up(device.PIO1));
+    let steps = GIVES_PULSES.then(|| Steps::set_up(&device.PIO0));
+    let motor = Motor::set_up(&device.PWM, guard::Guard::set_up(device.PIO1), steps);
     let supply = Supply::set_up(device.ADC);
     let bus = usb::bus(clocks.usb_clock, &mut resets);
     let Some(line) = SerialLine::set_up(bus, memory) else { stop() };
@@ -100,11 +108,15 @@ impl Hardware {
 
 impl Board<SENSORS> for Hardware {
     const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
+    const GIVES_PULSES: bool = GIVES_PULSES;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         // Clears the flag of the current tick.
         let _ = tick_is_due();
-        let raw_counts = self.encoders.raw_counts();
+        let mut raw_counts = self.encoders.raw_counts();
+        if let Some(pulses) = self.motor.pulses() {
+            raw_counts[0] = pulses;
+        }
         let [limit_low, limit_high] = pins::limits();
         let [was_low, was_high] = self.limits;
         let [was_stopped, was_faulty] = pins::was_reported();

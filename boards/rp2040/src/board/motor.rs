@@ -1,4 +1,4 @@
-//! The motor: PWM, direction and enable.
+//! The motor: enable, and PWM with direction, or step pulses.
 
 use hal::pac::PWM;
 use upright::board::Output;
@@ -6,6 +6,7 @@ use upright::board::Output;
 use super::CLOCK_HZ;
 use super::guard::{self, Guard};
 use super::pins;
+use super::steps::Steps;
 
 /// PWM frequency (Hz): above hearing.
 const PWM_HZ: u32 = 20_000;
@@ -16,16 +17,17 @@ const LEAST_PAUSE: u32 = PERIOD / 50;
 /// Slice of the PWM pin; output A.
 const SLICE: usize = (pins::PWM / 2) % 8;
 
-/// The PWM and the pins of the power stage.
+/// The pins of the power stage.
 pub(super) struct Motor {
     guard: Guard,
+    steps: Option<Steps>,
     on: bool,
     is_positive: bool,
 }
 
 impl Motor {
-    /// Starts the PWM with a duty of 0 and the power stage disabled.
-    pub(super) fn set_up(pwm: &PWM, guard: Guard) -> Self {
+    /// Starts the PWM with a duty of 0 and the power stage disabled. A drive that takes pulses has `steps`.
+    pub(super) fn set_up(pwm: &PWM, guard: Guard, steps: Option<Steps>) -> Self {
         let slice = pwm.ch(SLICE);
         // SAFETY, here and below: values within the widths of the fields (4.5.3).
         unsafe {
@@ -34,18 +36,26 @@ impl Motor {
             slice.cc().write(|w| w.bits(0));
             slice.csr().write(|w| w.bits(1));
         }
-        Self { guard, on: false, is_positive: false }
+        Self { guard, steps, on: false, is_positive: false }
     }
 
-    /// Whether the dead man's switch does not run.
+    /// Whether a state machine does not run.
     pub(super) fn has_failed(&self) -> bool {
-        self.guard.has_stopped()
+        self.guard.has_stopped() | self.steps.as_ref().is_some_and(Steps::have_stopped)
+    }
+
+    /// The number of all pulses, for a drive that takes them.
+    pub(super) fn pulses(&self) -> Option<u32> {
+        self.steps.as_ref().map(Steps::given)
     }
 
     /// Drives the motor for at most three ticks, or lets it coast.
     pub(super) fn drive(&mut self, output: &Output) {
         if !output.enable {
             set_level(0);
+            if let Some(steps) = &self.steps {
+                steps.stop();
+            }
             // Once: when it is off, it waits for the next time.
             if self.on {
                 self.guard.release();
@@ -53,8 +63,18 @@ impl Motor {
             self.on = false;
             return;
         }
-        let is_positive = output.duty > 0.0;
-        let active = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
+        if let Some(steps) = &mut self.steps {
+            steps.give(output.pulses());
+        } else {
+            self.turn(output.duty);
+        }
+        self.guard.hold();
+        self.on = true;
+    }
+
+    fn turn(&mut self, duty: f32) {
+        let is_positive = duty > 0.0;
+        let active = (duty.abs() * PERIOD as f32 + 0.5) as u32;
         set_level(active.min(PERIOD - LEAST_PAUSE));
         if is_positive != self.is_positive {
             // The last clock of the period: the output is low, and the new level counts from the next clock on.
@@ -62,8 +82,6 @@ impl Motor {
             pins::set_direction(is_positive);
             self.is_positive = is_positive;
         }
-        self.guard.hold();
-        self.on = true;
     }
 }
 

@@ -2,12 +2,14 @@
 
 use hal::pac::{IO_BANK0, PADS_BANK0, RESETS, SIO};
 
+use super::GIVES_PULSES;
 use super::chip::BLOCKS;
 
 /// Phase B of each encoder, from the cart's on; phase A is the next pin.
 pub(super) const ENCODERS: [usize; 5] = [0, 2, 4, 6, 8];
-/// PWM: output A of slice 5.
+/// PWM: output A of slice 5. Step pulses for a drive that takes them.
 pub(super) const PWM: usize = 10;
+pub(super) const STEP: usize = PWM;
 pub(super) const DIRECTION: usize = 11;
 pub(super) const ENABLE: usize = 12;
 const LIMIT_LOW: usize = 13;
@@ -29,6 +31,7 @@ const ANALOG: u32 = 1 << 7;
 // Functions (2.19.2).
 const FUNCTION_PWM: u32 = 4;
 const FUNCTION_SIO: u32 = 5;
+const FUNCTION_PIO0: u32 = 6;
 const FUNCTION_PIO1: u32 = 7;
 const NO_FUNCTION: u32 = 31;
 
@@ -51,9 +54,9 @@ pub(super) fn set_up(resets: &RESETS, pads: &PADS_BANK0, functions: &IO_BANK0) {
     }
     sio().gpio_out_clr().write(|w| unsafe { w.bits(1 << DIRECTION | 1 << STATUS_LED) });
     sio().gpio_oe_set().write(|w| unsafe { w.bits(1 << DIRECTION | 1 << STATUS_LED) });
-    set(DIRECTION, PULLED_DOWN, FUNCTION_SIO);
+    set(DIRECTION, PULLED_DOWN, if GIVES_PULSES { FUNCTION_PIO0 } else { FUNCTION_SIO });
     set(STATUS_LED, FLOATING, FUNCTION_SIO);
-    set(PWM, PULLED_DOWN, FUNCTION_PWM);
+    set(PWM, PULLED_DOWN, if GIVES_PULSES { FUNCTION_PIO0 } else { FUNCTION_PWM });
     set(ENABLE, PULLED_DOWN, FUNCTION_PIO1);
     set(SUPPLY, ANALOG, NO_FUNCTION);
 }

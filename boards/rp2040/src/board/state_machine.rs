@@ -2,11 +2,12 @@
 
 use hal::pac::pio0::RegisterBlock;
 
-/// Where a program begins, where it repeats from, and its last instruction.
+/// Where a program begins, where it repeats from, its last instruction, and the divider of its clock.
 pub(super) struct Course {
     pub(super) begin: u32,
     pub(super) repeat: u32,
     pub(super) last: u32,
+    pub(super) divider: u32,
 }
 
 /// Writes a program into the instruction memory from `origin` on.
@@ -28,9 +29,9 @@ pub(super) fn start(
     first: &[u16],
 ) {
     let machine = pio.sm(number);
-    // SAFETY: values of the fields of table 368 and its neighbours; the clock is not divided.
+    // SAFETY: values of the fields of table 368 and its neighbours.
     unsafe {
-        machine.sm_clkdiv().write(|w| w.bits(1 << 16));
+        machine.sm_clkdiv().write(|w| w.bits(course.divider << 16));
         let execution = (tested_pin as u32) << 24 | course.last << 12 | course.repeat << 7;
         machine.sm_execctrl().write(|w| w.bits(execution));
         // IN shifts left, OUT shifts right; nothing moves by itself.
@@ -42,6 +43,15 @@ pub(super) fn start(
         // A jump to where it begins.
         machine.sm_instr().write(|w| w.bits(course.begin));
         pio.ctrl().modify(|r, w| w.bits(r.bits() | 1 << number));
+    }
+}
+
+/// Continues elsewhere, at once, whatever it waits for.
+pub(super) fn restart(pio: &RegisterBlock, number: usize, at: u32) {
+    // SAFETY: bits of CTRL, and a jump.
+    unsafe {
+        pio.ctrl().modify(|r, w| w.bits(r.bits() | 1 << (4 + number)));
+        pio.sm(number).sm_instr().write(|w| w.bits(at));
     }
 }
 

@@ -115,15 +115,60 @@ struct UnitPush {
 impl UnitPush {
     fn new(held: &Matrix<f64>, pushed_loop: &PushedLoop<'_>, kalman: &Kalman<f64>) -> Self {
         let rig = pushed_loop.rig;
-        let sensors = rig.sensors();
-        let mut error = Matrix::zeros(held.rows(), 1);
+        let mut predicted = PredictionError::new(pushed_loop, kalman);
         let response = (0..ticks(rig, DURATIONS_S[DURATIONS_S.len() - 1] + AFTER_S)).map(|_| {
-            let seen: Vec<f64> = sensors.iter().map(|sensor| error[(sensor.state, 0)]).collect();
-            let corrected = &error - &(&kalman.l_filter * &Matrix::column(&seen));
-            error = &(&pushed_loop.design.ad * &corrected) + held;
-            corrected.entries().to_vec()
+            predicted.see();
+            predicted.pass();
+            predicted.push(held.entries());
+            predicted.corrected.clone()
         });
         Self { response: response.collect(), held: held.entries().to_vec() }
+    }
+}
+
+/// The error of the prediction, tick by tick.
+struct PredictionError<'a> {
+    ad: &'a Matrix<f64>,
+    l_filter: &'a Matrix<f64>,
+    measured: Vec<usize>,
+    /// Error of the predicted state.
+    error: Vec<f64>,
+    /// What the sensors show of it (m or rad).
+    seen: Vec<f64>,
+    /// Error of the corrected estimate.
+    corrected: Vec<f64>,
+}
+
+impl<'a> PredictionError<'a> {
+    /// No error.
+    fn new(pushed_loop: &PushedLoop<'a>, kalman: &'a Kalman<f64>) -> Self {
+        let (ad, l_filter) = (&pushed_loop.design.ad, &kalman.l_filter);
+        let measured: Vec<usize> = pushed_loop.rig.sensors().iter().map(|sensor| sensor.state).collect();
+        let (zeros, seen) = (vec![0.0; ad.rows()], vec![0.0; measured.len()]);
+        Self { ad, l_filter, measured, error: zeros.clone(), seen, corrected: zeros }
+    }
+
+    /// The sensors show the error.
+    fn see(&mut self) {
+        for sensor in 0..self.measured.len() {
+            self.seen[sensor] = self.error[self.measured[sensor]];
+        }
+    }
+
+    /// A tick passes: the estimate is corrected by what was seen, and the error moves on with the state.
+    fn pass(&mut self) {
+        self.l_filter.times_column(&self.seen, &mut self.corrected);
+        for i in 0..self.error.len() {
+            self.corrected[i] = self.error[i] - self.corrected[i];
+        }
+        self.ad.times_column(&self.corrected, &mut self.error);
+    }
+
+    /// What a push changes in a tick.
+    fn push(&mut self, change: &[f64]) {
+        for (error, change) in self.error.iter_mut().zip(change) {
+            *error += change;
+        }
     }
 }
 
@@ -169,27 +214,24 @@ impl PushedLoop<'_> {
     fn survives(&self, law: &Feedback<f64>, push: &UnitPush, lasts: usize, force_n: f64) -> bool {
         let is_late = self.rig.tick.delay_ticks == 1;
         let mut state = vec![0.0; push.held.len()];
+        let (mut estimate, mut next) = (state.clone(), state.clone());
         let mut pending = 0.0;
         let watched = (lasts + ticks(self.rig, AFTER_S)).min(push.response.len());
         (0..watched).all(|tick| {
             let since_end = tick.checked_sub(lasts);
-            let estimate: Vec<f64> = (state.iter().enumerate())
-                .map(|(i, x)| {
-                    let after = since_end.map_or(0.0, |since| push.response[since][i]);
-                    x - force_n * (push.response[tick][i] - after)
-                })
-                .collect();
+            for i in 0..state.len() {
+                let after = since_end.map_or(0.0, |since| push.response[since][i]);
+                estimate[i] = state[i] - force_n * (push.response[tick][i] - after);
+            }
             let of_pending = if is_late { law.k.row(0)[estimate.len()] * pending } else { 0.0 };
             let requested = law.force_n(0.0, &estimate) - of_pending;
             let applied = requested.clamp(-self.limit, self.limit);
             let acting = if is_late { core::mem::replace(&mut pending, applied) } else { applied };
             let force_n = if since_end.is_none() { force_n } else { 0.0 };
-            state = (self.design.ad.row_slices().zip(self.design.bd.entries()).zip(&push.held))
-                .map(|((row, b), held)| {
-                    let free: f64 = row.iter().zip(&state).map(|(a, x)| a * x).sum();
-                    free + b * acting + held * force_n
-                })
-                .collect();
+            self.design.ad.times_column(&state, &mut next);
+            for i in 0..state.len() {
+                state[i] = next[i] + self.design.bd[(i, 0)] * acting + push.held[i] * force_n;
+            }
             self.limits.allow(&state)
         })
     }
@@ -206,17 +248,18 @@ impl PushedLoop<'_> {
         force_n: f64,
         healthy: f64,
     ) -> Vec<f64> {
-        let sensors = self.rig.sensors();
-        let held = Matrix::column(&push.held).scaled(&force_n);
-        let mut error = Matrix::zeros(held.rows(), 1);
-        let mut largest = vec![0.0f64; sensors.len()];
-        let mut last = vec![[0.0f64; IN_A_ROW as usize]; sensors.len()];
+        let held: Vec<f64> = push.held.iter().map(|held| held * force_n).collect();
+        let mut predicted = PredictionError::new(self, kalman);
+        let mut largest = vec![0.0f64; predicted.seen.len()];
+        let mut last = vec![[0.0f64; IN_A_ROW as usize]; predicted.seen.len()];
         let (mut accepted, mut rejected) = (0.0f64, 0);
         for tick in 0..push.response.len() {
-            let mut seen: Vec<f64> = sensors.iter().map(|sensor| error[(sensor.state, 0)]).collect();
-            for ((most, last), e) in largest.iter_mut().zip(&mut last).zip(&seen) {
-                last[tick % last.len()] = e.abs();
-                *most = most.max(last.iter().copied().fold(f64::INFINITY, f64::min));
+            predicted.see();
+            let seen = &mut predicted.seen;
+            for sensor in 0..seen.len() {
+                last[sensor][tick % IN_A_ROW as usize] = seen[sensor].abs();
+                let least = last[sensor].iter().copied().fold(f64::INFINITY, f64::min);
+                largest[sensor] = largest[sensor].max(least);
             }
             let plausible = accepted.min(0.0) - healthy..=accepted.max(0.0) + healthy;
             if plausible.contains(&seen[0]) || rejected + 1 == IN_A_ROW {
@@ -225,10 +268,9 @@ impl PushedLoop<'_> {
                 seen[0] = 0.0;
                 rejected += 1;
             }
-            let corrected = &error - &(&kalman.l_filter * &Matrix::column(&seen));
-            error = &self.design.ad * &corrected;
+            predicted.pass();
             if tick < lasts {
-                error = &error + &held;
+                predicted.push(&held);
             }
         }
         largest

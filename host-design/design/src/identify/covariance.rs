@@ -7,6 +7,8 @@ use super::record::Record;
 
 /// Factors on the smoothing of the dry friction, one for each refit.
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
+/// Factor on the excess of the friction at rest, if there is one.
+const OTHER_EXCESS: f64 = 0.5;
 /// Iterations of each refit.
 const ITERATIONS: usize = 2;
 /// Terms that are added in quadrature to a statistical deviation.
@@ -51,6 +53,12 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
     for factor in SMOOTHINGS {
         let mut model = filter.model.clone();
         model.smoothing = model.smoothing.map(|smoothing| factor * smoothing);
+        let other = Filter { model: &model, ..*filter };
+        widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
+    }
+    if filter.model.excess != [0.0; 2] {
+        let mut model = filter.model.clone();
+        model.excess = model.excess.map(|excess| OTHER_EXCESS * excess);
         let other = Filter { model: &model, ..*filter };
         widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
     }

@@ -3,7 +3,7 @@
 use super::parameters::ParameterKind;
 use crate::number::significant;
 
-/// A reason to doubt an identification from free swings.
+/// A reason to doubt an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
     /// A term of friction was left out on request, but the recordings want it.
@@ -20,6 +20,8 @@ pub enum Doubt {
         /// Their largest difference, in the deviations that follow from the scatter within the halves.
         deviations: f64,
     },
+    /// The friction of the cart or of the joints at rest is larger than in motion, by these shares.
+    LargerAtRest([f64; 2]),
     /// The model leaves far more of the measurements unexplained than the sensor would.
     Residual {
         /// The cart, or a joint from 1.
@@ -29,6 +31,13 @@ pub enum Doubt {
         /// Residuals of windows of 0.5 s (rms), as a multiple of that.
         times: f64,
     },
+}
+
+impl Doubt {
+    /// What the excesses of the friction at rest of cart and joints say, if there are any.
+    pub(super) fn of_excess(excess: [f64; 2]) -> Option<Self> {
+        (excess != [0.0; 2]).then_some(Doubt::LargerAtRest(excess))
+    }
 }
 
 impl core::fmt::Display for Doubt {
@@ -49,6 +58,13 @@ impl core::fmt::Display for Doubt {
                     names.join("; ")
                 )
             }
+            Doubt::LargerAtRest([cart, joints]) => write!(
+                f,
+                "Dry friction at rest is larger than in motion: of the cart by about {:.0} %, of the joints by about {:.0} %. The dry \
+                 frictions above are those in motion; give breakaway_percent in [reality].",
+                100.0 * cart,
+                100.0 * joints
+            ),
             Doubt::Residual { channel, allowed, times } => write!(
                 f,
                 "The residuals of {channel} are {times:.1} times what quantisation and noise of its encoder allow ({}): the model \

@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
+use super::at_rest;
 use super::channel::chain_of;
 use super::covariance::{changes, deviations};
+use super::doubt::Doubt;
 use super::error::IdentifyError;
 use super::estimated::{Estimate, Identification};
 use super::free;
 use super::log::Log;
+use super::model::Model;
 use super::old_values::old_values;
 use super::parameters::{Layout, ParameterKind, Prior, priors};
 use super::prediction::Filter;
@@ -149,7 +152,7 @@ fn decide(chain: &Chain, settings: &Settings, p: &[f64], found: &mut Identificat
 /// Errors of predictions of `recordings`, with the old file and with the parameters `p`.
 fn predicted(
     rig: &Rig,
-    model: &super::model::Model,
+    model: &Model,
     priors: &[Prior],
     p: &[f64],
     recordings: &Recordings,
@@ -158,6 +161,14 @@ fn predicted(
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
     let old = old_values(rig, model.layout, &start, p);
     Ok(window_errors(model, priors, &[(&record, [&old, p])]))
+}
+
+/// The model with the friction laws under which the measurements are most likely.
+fn with_friction_laws(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Model {
+    let mut model = filter.model.clone();
+    model.smoothing = filter.smoothing(p, noise);
+    model.excess = at_rest::excess(&Filter { model: &model, ..*filter }, p, noise);
+    model
 }
 
 /// The parts of the record, and the priors.
@@ -182,7 +193,7 @@ impl Fitted<'_> {
     /// Multiple shooting, prediction-error fit, deviations, and the comparison on the held-out part.
     fn run(
         &self,
-        model: &super::model::Model,
+        model: &Model,
         found: &mut Identification,
         progress: Progress<'_>,
     ) -> Result<(), IdentifyError> {
@@ -197,8 +208,8 @@ impl Fitted<'_> {
         let undetermined = || IdentifyError::Undetermined("the equations have no solution");
         let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
         // Noise and smoothing were tuned for the parameters before this fit.
-        let mut model = model.clone();
-        model.smoothing = filter.smoothing(&p, &noise);
+        let model = with_friction_laws(&filter, &p, &noise);
+        found.doubts.extend(Doubt::of_excess(model.excess));
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);
         let (p, normal) = filter.fit(&p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
@@ -240,7 +251,7 @@ impl Fitted<'_> {
 
     /// Predictions over windows whose initial states are fitted, with both sets of `values`: those of the old file and
     /// the new ones.
-    fn held_out(&self, model: &super::model::Model, values: [&[f64]; 2]) -> HeldOut {
+    fn held_out(&self, model: &Model, values: [&[f64]; 2]) -> HeldOut {
         let shooting = Shooting { model, record: self.held, priors: self.priors, free: false };
         let fits = values.map(|p| shooting.fit(p, HELD_OUT_WINDOW_S, ITERATIONS.0, ITERATIONS.1));
         let [by_file, by_found] = fits.each_ref().map(|fit| shooting.predictions(fit));

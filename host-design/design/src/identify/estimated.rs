@@ -54,7 +54,7 @@ pub struct Identification {
     pub realised: Option<Realised>,
     /// Delay that the rig file states (ticks).
     pub delay_ticks: u8,
-    /// What casts doubt on the numbers; only without a drive.
+    /// What casts doubt on the numbers.
     pub doubts: Vec<Doubt>,
     /// Why no rig file may be written; none if it may.
     pub refusal: Option<Refusal>,

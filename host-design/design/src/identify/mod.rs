@@ -25,10 +25,13 @@
 //!
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
+mod at_rest;
 mod channel;
 mod convert;
 mod covariance;
 mod coverage;
+#[cfg(test)]
+mod decay;
 mod doubt;
 mod error;
 mod estimate;
@@ -52,6 +55,7 @@ mod recordings;
 mod rows;
 mod shooting;
 mod step;
+mod stribeck;
 mod table;
 mod verdict;
 mod window_errors;

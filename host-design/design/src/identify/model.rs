@@ -5,6 +5,7 @@
 
 use super::parameters::Layout;
 use super::rows::add_multiple;
+use super::stribeck;
 
 /// The chain in the notation of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
 /// φ_n.
@@ -22,7 +23,8 @@ use super::rows::add_multiple;
 /// dζ/dx = (1 - ζ sgn ẋ)/δ
 /// ```
 ///
-/// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. Here
+/// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. If the friction at rest is larger than in
+/// motion, c_0 and c_i have a factor ([`stribeck::factor`]). Here
 /// e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
 /// instead of the first equation. A cart that reverses is held by its friction until the bristle has
 /// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
@@ -33,6 +35,9 @@ pub(super) struct Model {
     pub(super) gravity: f64,
     /// δ of the cart (m) and ε of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
+    /// Excess of the friction at rest of the cart and of the joints, as a share of the friction in motion; not of
+    /// joints that have a bristle.
+    pub(super) excess: [f64; 2],
     /// Whether the cart cannot move.
     pub(super) is_clamped: bool,
     /// Whether the friction of each joint has a bristle, as that of the cart has.
@@ -96,6 +101,11 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
+    /// Factor of the dry friction of the cart at the speed `v` (m/s), and its derivative.
+    fn cart_factor(&self, v: f64) -> [f64; 2] {
+        stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v)
+    }
+
     /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
     /// and the tanh or the bristle deflection.
     fn friction(&self, p: &[f64], at: &[f64], joint: usize, rate: f64) -> [f64; 3] {
@@ -105,9 +115,10 @@ impl Model {
             let bristle = at[2 * self.coordinates() + 1 + joint];
             return [viscous * rate + dry * bristle, viscous, bristle];
         }
+        let [factor, by_rate] = stribeck::factor(self.excess[1], stribeck::SPEEDS[1], rate);
         let direction = libm::tanh(rate / smoothing);
-        let slope = viscous + dry * (1.0 - direction * direction) / smoothing;
-        [viscous * rate + dry * direction, slope, direction]
+        let slope = factor * (1.0 - direction * direction) / smoothing + by_rate * direction;
+        [viscous * rate + dry * factor * direction, viscous + dry * slope, factor * direction]
     }
 }
 
@@ -139,7 +150,7 @@ impl Accelerations {
         self.factors[0] = total;
         right[0] = input.force
             - (p[layout.viscous(0)] + input.back_emf) * v
-            - p[layout.dry(0)] * bristle
+            - p[layout.dry(0)] * model.cart_factor(v)[0] * bristle
             - model.gravity * total * slope_sine;
         let mut below = 0.0;
         for j in 0..n {
@@ -190,8 +201,9 @@ impl Accelerations {
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
-        by[m] -= input.back_emf + p[layout.viscous(0)];
-        by[2 * m] -= p[layout.dry(0)];
+        let [factor, by_speed] = model.cart_factor(at[m]);
+        by[m] -= input.back_emf + p[layout.viscous(0)] + p[layout.dry(0)] * by_speed * at[2 * m];
+        by[2 * m] -= p[layout.dry(0)] * factor;
         let mut below = 0.0;
         for j in 0..n {
             let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
@@ -235,7 +247,7 @@ impl Accelerations {
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
         by[s + Layout::TOTAL_MASS] -= xdd + gravity * slope_sine;
         by[s + layout.viscous(0)] -= v;
-        by[s + layout.dry(0)] -= at[2 * m];
+        by[s + layout.dry(0)] -= model.cart_factor(v)[0] * at[2 * m];
         by[s + layout.tilt()] -= gravity * p[Layout::TOTAL_MASS] * slope_cosine;
         by[s + layout.delay()] += input.by_delay;
         by[s + layout.dead_zone()] += input.by_dead_zone;
@@ -345,6 +357,7 @@ pub(super) mod tests {
             layout: Layout { links: 3 },
             gravity: chain.gravity_m_per_s2,
             smoothing: SMOOTHING,
+            excess: [0.3, 0.2],
             is_clamped: false,
             has_bristles: false,
         };

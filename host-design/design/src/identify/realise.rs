@@ -48,8 +48,12 @@ pub struct RealisedLink {
 /// Relative margin of a mass above the least that its moments allow.
 const SPARE: f64 = 1e-6;
 
-/// The machine with the parameters `p` whose link masses are nearest to those of the file. Only M_t, a_j, l_j and J_j
-/// are identified, so each mass can be chosen, and centre of mass and inertia follow:
+/// Shares of the link masses of the file that are tried one after the other.
+const SHARES: [f64; 8] = [1.0, 0.8, 0.6, 0.4, 0.3, 0.2, 0.1, 0.0];
+
+/// The machine with the parameters `p` whose link masses are those of the file, or the largest share of them with which
+/// it is physical: a link that carries too heavy ones would have no mass of its own. Only M_t, a_j, l_j and J_j are
+/// identified, so each mass can be chosen, and centre of mass and inertia follow:
 ///
 /// ```text
 /// c_j = (a_j - l_j S_j) / m_j,   I_j = J_j - l_j² S_j - m_j c_j²,   S_j = m_{j+1} + … + m_n
@@ -61,6 +65,19 @@ const SPARE: f64 = 1e-6;
 /// # Errors
 /// [`IdentifyError::Physical`] if a link or the cart would have no positive mass.
 pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<Realised, IdentifyError> {
+    let whole = with_masses(chain, p, weighed, SHARES[0]);
+    whole.or_else(|error| {
+        SHARES[1..].iter().find_map(|&share| with_masses(chain, p, weighed, share).ok()).ok_or(error)
+    })
+}
+
+/// The machine with `share` of the link masses of the file, but none so small that its moments do not allow it.
+fn with_masses(
+    chain: &Chain,
+    p: &[f64],
+    weighed: Option<f64>,
+    share: f64,
+) -> Result<Realised, IdentifyError> {
     let n = chain.links.len();
     let layout = Layout { links: n };
     let scale = weighed.map_or(1.0, |moment| moment / p[layout.first_moment(n - 1)]);
@@ -81,7 +98,7 @@ pub(super) fn realise(chain: &Chain, p: &[f64], weighed: Option<f64>) -> Result<
         }
         // I_j >= 0, and the centre of mass at most 9.9 lengths from the joint.
         let least = (moment * moment / second).max(moment / (9.9 * length));
-        let mass_kg = chain.links[j].mass_kg.max(least * (1.0 + SPARE));
+        let mass_kg = (share * chain.links[j].mass_kg).max(least * (1.0 + SPARE));
         let centre_m = moment / mass_kg;
         links.push(RealisedLink {
             mass_kg,
@@ -155,6 +172,23 @@ mod tests {
                 close(constants.b[(j, j)], p[layout.second_moment(j)]);
             }
         }
+    }
+
+    /// A link of the file that is heavier than what its own joint carries can be made lighter.
+    #[test]
+    fn heavy_links_of_the_file_are_made_lighter() {
+        let (mut chain, p) = chain_and_values("double-quanser-dbpen.toml");
+        chain.links[1].mass_kg *= 4.0;
+        let layout = Layout { links: 2 };
+        assert!(chain.links[1].mass_kg * p[layout.length(0)] > p[layout.first_moment(0)]);
+        let found = realise(&chain, &p, None).unwrap();
+        let [first, second] = [&found.links[0], &found.links[1]];
+        let close =
+            |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
+        close(second.mass_kg * second.centre_m, p[layout.first_moment(1)]);
+        let moment = first.mass_kg * first.centre_m + second.mass_kg * first.length_m;
+        close(moment, p[layout.first_moment(0)]);
+        assert!(found.links.iter().all(|link| link.inertia_kg_m2 >= 0.0 && link.centre_m > 0.0), "{found:?}");
     }
 
     #[test]

@@ -227,6 +227,26 @@ fn add_row<R: Real>(entries: &mut [R], factor: &R, row: &[R]) {
     }
 }
 
+impl<R: Real> Matrix<R> {
+    /// Writes the product with the column `entries` into `product`: the bits of `*`, without new memory.
+    ///
+    /// # Panics
+    /// If `entries` is shorter than a row, or `product` longer than a column.
+    pub fn times_column(&self, entries: &[R], product: &mut [R]) {
+        for (i, of_row) in product.iter_mut().enumerate() {
+            let row = self.row(i);
+            let entries = &entries[..row.len()];
+            let mut sum = R::zero();
+            for k in 0..row.len() {
+                if !row[k].is_zero() {
+                    sum = entries[k].times(&row[k]) + &sum;
+                }
+            }
+            *of_row = sum;
+        }
+    }
+}
+
 impl<R: Real> Mul for &Matrix<R> {
     type Output = Matrix<R>;
     fn mul(self, right: &Matrix<R>) -> Matrix<R> {

@@ -178,6 +178,11 @@ impl LinkedImage {
         })
     }
 
+    /// The address of the function with this name.
+    pub fn address_of(&self, function: &str) -> Option<u32> {
+        self.functions.iter().find(|item| item.name == function).map(|item| item.address)
+    }
+
     /// The machine code of a function.
     pub(crate) fn code(&self, function: &Item) -> Vec<Code> {
         let Some((base, text)) = code_at(&self.code, function.address) else { return Vec::new() };

@@ -27,7 +27,7 @@ pub struct PicoImage {
 /// # Errors
 /// [`BuildError`] if the board cannot run this rig, there is no compiler, or it fails.
 pub fn build_pico(board: PicoBoard, rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildError> {
-    check(board, table.sensors(), rig.tick.period_s, table.swing_up.is_some())?;
+    check(board, table.sensors(), rig.tick.period_s, table.swing_up.is_some(), table.steps.as_ref())?;
     let name = format!(
         "{}-{:016x}-{:08x}-{:08x}",
         board.name(),

@@ -48,7 +48,7 @@ impl PicoBoard {
     /// Where its image has been executed.
     pub(super) const fn executed(self) -> &'static str {
         match self {
-            Self::Pico => "rp2040js 1.4.1",
+            Self::Pico => "rp2040js 1.4.1, with a motor and with a stepper",
             Self::Pico2 => "compiled; its bits by the replay image in QEMU; peripherals untried",
         }
     }

@@ -1,17 +1,19 @@
-//! The page's module computes the same bits as this computer.
+//! The page's module computes the same bits as this computer, in Node and in the page.
 //!
-//! Needs Node, a compiler for WebAssembly, and minutes to compile, so the tests run only where `UPRIGHT_REQUIRE_WASM=1`
-//! is set.
+//! Needs Node, Chromium, a compiler for WebAssembly, and minutes to compile, so the tests run only where
+//! `UPRIGHT_REQUIRE_WASM=1` is set.
 
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
+use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 use upright_page::{Desk, TICKS};
 use upright_tool::site::module;
 
 use crate::equipment::{is_required, not_exercised};
+use crate::site_page::{opened, until as until_designed};
+use crate::twin_page::comes_within;
 
 /// Rigs that the firmware does not run on the host: a model with ten states, of which only the table is compared.
 const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
@@ -41,6 +43,11 @@ pub(crate) fn is_wanted(what: &str) -> bool {
 
 /// The answers of the module in Node.
 pub(crate) fn in_node(questions: &[Value]) -> Vec<Value> {
+    in_node_with_time(questions).0
+}
+
+/// The same, and the least processor time of an answer, as text.
+pub(crate) fn in_node_with_time(questions: &[Value]) -> (Vec<Value>, String) {
     let folder = tempfile::tempdir().unwrap();
     let (wasm, asked) = (folder.path().join("page.wasm"), folder.path().join("questions.json"));
     std::fs::write(&wasm, module().unwrap()).unwrap();
@@ -49,7 +56,61 @@ pub(crate) fn in_node(questions: &[Value]) -> Vec<Value> {
     let output = Command::new("node").arg(script).args([&wasm, &asked]).output().expect("Node is installed");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let answers: Vec<String> = serde_json::from_slice(&output.stdout).unwrap();
-    answers.iter().map(|answer| serde_json::from_str(answer).unwrap()).collect()
+    let answers = answers.iter().map(|answer| serde_json::from_str(answer).unwrap()).collect();
+    (answers, String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// What is asked of all machines, and the answers of this computer.
+struct Compared {
+    rigs: Vec<(String, String, Option<String>)>,
+    /// The table and run of each rig; then three short runs of the first one, with one operation of the second and
+    /// third rounded as another compiler might.
+    questions: Vec<Value>,
+    here: Vec<Value>,
+}
+
+/// The same for all tests: it takes as long as the compiler for WebAssembly, and goes on beside it.
+fn compared() -> &'static Compared {
+    static COMPARED: LazyLock<Compared> = LazyLock::new(|| {
+        let rigs = rigs();
+        let ask = |(_, toml, motions): &(String, String, Option<String>), rounding: &str, ticks: u32| json!({ "ask": "fingerprint", "toml": toml, "motions": motions, "rounding": rounding, "ticks": ticks });
+        let mut questions: Vec<Value> = rigs.iter().map(|rig| ask(rig, "as-written", TICKS)).collect();
+        questions
+            .extend(["as-written", "fused", "other-order"].map(|rounding| ask(&rigs[0], rounding, 2000)));
+        let here = upright_design::parallel::map(0..questions.len(), |number| -> Value {
+            // The same question for all of the short runs: on this computer, nothing is planted.
+            let number = number.min(rigs.len());
+            serde_json::from_str(&Desk::default().answer(&questions[number].to_string())).unwrap()
+        });
+        Compared { rigs, questions, here }
+    });
+    &COMPARED
+}
+
+impl Compared {
+    /// Compares the answers of another machine.
+    fn assert_same(&self, there: &[Value]) {
+        for ((name, _, motions), (here, there)) in self.rigs.iter().zip(self.here.iter().zip(there)) {
+            eprintln!("{name}: {there}");
+            assert_eq!(here, there, "{name}");
+            if there["run"].is_null() {
+                assert!(NO_FIRMWARE.contains(&name.as_str()), "{name}: {there}");
+                continue;
+            }
+            assert!(
+                there["ticks"][0].as_u64() > Some(20_000) && there["fault"].is_string(),
+                "{name}: {there}"
+            );
+            let moves = [1, 2].map(|motion| there["ticks"][motion].as_u64() > Some(0));
+            assert_eq!(moves, [motions.is_some(); 2], "{name}: {there}");
+        }
+        // Negative control: with one operation rounded otherwise there, the run differs and the table does not.
+        let planted = self.rigs.len();
+        assert_eq!(self.here[planted], there[planted]);
+        for (here, there) in self.here.iter().zip(there).skip(planted + 1) {
+            assert!(there["run"] != here["run"] && there["table"] == here["table"], "{there}");
+        }
+    }
 }
 
 #[test]
@@ -57,32 +118,37 @@ fn tables_and_runs_of_all_rigs_have_the_same_bits_in_webassembly() {
     if !is_wanted("WebAssembly against this computer") {
         return;
     }
-    let ask = |(_, toml, motions): &(String, String, Option<String>), rounding: &str, ticks: u32| json!({ "ask": "fingerprint", "toml": toml, "motions": motions, "rounding": rounding, "ticks": ticks });
-    let rigs = rigs();
-    let mut questions: Vec<Value> = rigs.iter().map(|rig| ask(rig, "as-written", TICKS)).collect();
-    let planted = questions.len();
-    questions.extend(["as-written", "fused", "other-order"].map(|rounding| ask(&rigs[0], rounding, 2000)));
-    let begin = Instant::now();
-    let there = in_node(&questions);
-    let (there_s, begin) = (begin.elapsed().as_secs_f64(), Instant::now());
-    let here = upright_design::parallel::map(0..questions.len(), |number| -> Value {
-        serde_json::from_str(&Desk::default().answer(&questions[number].to_string())).unwrap()
-    });
-    eprintln!("module and answers in {there_s:.0} s, here in {:.0} s", begin.elapsed().as_secs_f64());
-    for ((name, _, motions), (here, there)) in rigs.iter().zip(here.iter().zip(&there)) {
-        eprintln!("{name}: {there}");
-        assert_eq!(here, there, "{name}");
-        if there["run"].is_null() {
-            assert!(NO_FIRMWARE.contains(&name.as_str()), "{name}: {there}");
-            continue;
-        }
-        assert!(there["ticks"][0].as_u64() > Some(20_000) && there["fault"].is_string(), "{name}: {there}");
-        let moves = [1, 2].map(|motion| there["ticks"][motion].as_u64() > Some(0));
-        assert_eq!(moves, [motions.is_some(); 2], "{name}: {there}");
+    let compared = compared();
+    compared.assert_same(&in_node(&compared.questions));
+}
+
+#[test]
+fn tables_and_runs_of_all_rigs_have_the_same_bits_in_the_page() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    let compared = compared();
+    browser.value(&format!(
+        "{{ window.found = []; \
+         (async () => {{ for (const question of {}) found.push(await upright.ask(question)); }})(); 0; }}",
+        json!(compared.questions)
+    ));
+    let is_done = format!("found.length === {}", compared.questions.len());
+    assert!(comes_within(&mut browser, 300.0, &is_done), "{}", browser.value("found"));
+    compared.assert_same(browser.value("found").as_array().unwrap());
+
+    // Each of them is shown, with its run.
+    for (name, ..) in &compared.rigs {
+        browser.value(&format!(
+            "{{ const example = document.getElementById('example'); example.value = '{name}'; \
+             document.getElementById('verdict').textContent = ''; example.dispatchEvent(new Event('change')); }}"
+        ));
+        until_designed(
+            &mut browser,
+            &format!(
+                "upright.desk.design.rig === '{name}' && document.getElementById('verdict').textContent"
+            ),
+        );
+        let verdict = browser.value("document.getElementById('verdict').textContent");
+        assert!(verdict.as_str().unwrap().starts_with("survives"), "{name}: {verdict}");
     }
-    // Negative control: with one operation rounded otherwise in WebAssembly, the run differs and the table does not.
-    assert_eq!(here[planted], there[planted]);
-    for other in &there[planted + 1..] {
-        assert!(other["run"] != here[planted]["run"] && other["table"] == here[planted]["table"], "{other}");
-    }
+    assert_eq!(browser.errors(), Vec::<String>::new());
 }

@@ -62,12 +62,15 @@ pub(crate) fn opened_in(width: u32) -> Option<(Browser, tempfile::TempDir)> {
     let text = page(&module().unwrap(), &examples.unwrap(), &lessons.unwrap());
     std::fs::write(&file, &text).unwrap();
     let compressed = miniz_oxide::deflate::compress_to_vec(text.as_bytes(), 9).len();
-    eprintln!("the page has {} bytes, {compressed} compressed", text.len());
+    eprintln!("page: {} bytes, {compressed} compressed", text.len());
     assert!(compressed < COMPRESSED, "{compressed} bytes");
     let begin = Instant::now();
     browser.open(&file, width, "light", "screen");
     until(&mut browser, "upright.desk.design && upright.desk.poles");
-    eprintln!("gains and poles of four links after {:.2} s", begin.elapsed().as_secs_f64());
+    eprintln!(
+        "page: opened, with gains and poles of four links, after {:.2} s",
+        begin.elapsed().as_secs_f64()
+    );
     Some((browser, folder))
 }
 
@@ -80,13 +83,23 @@ fn a_rig_is_designed_and_exported_in_the_page_as_on_the_command_line() {
     let name = rig.to_str().unwrap();
     assert_eq!(browser.value("upright.exported('table')"), written(&["design", name], "--out"));
     assert_eq!(browser.value("upright.exported('header')"), written(&["export", name], "--c"));
+    // The run of the other law, with its header of units.
+    browser.value(
+        "{ const law = document.getElementById('law'); law.value = 'pole-placement'; \
+         law.dispatchEvent(new Event('change')); }",
+    );
+    let csv = browser.value("upright.exported('csv')");
+    let run = |law: &str| {
+        let tilt = (0.5 / (180.0 / std::f64::consts::PI)).to_string();
+        let run = ["simulate", name, "--law", law, "--duration", "8", "--step", "0.1", "--tilt", &tilt];
+        written(&run, "--csv")
+    };
+    assert!(csv.as_str().unwrap().starts_with("t_s,target_m,setpoint_m,force_requested_n,force_n,x_m,"));
+    assert_eq!(csv, run("pole-placement"));
+    // Negative control: the run of another law.
+    assert_ne!(csv, run("lqr"));
     assert_eq!(browser.errors(), Vec::<String>::new());
 
-    // The browser computes the bits of this computer.
-    let single = std::fs::read_to_string(root().join("rigs/single-quanser-ip02.toml")).unwrap();
-    let question = json!({ "ask": "fingerprint", "toml": single, "rounding": "as-written", "ticks": 20_000 });
-    let here: Value = serde_json::from_str(&Desk::default().answer(&question.to_string())).unwrap();
-    assert_eq!(browser.value(&format!("upright.ask({question})")), here);
     // Negative control: the policy keeps the page from asking anybody.
     browser.value("fetch('data:,hello').catch(() => 0)");
     assert!(browser.errors().iter().any(|error| error.contains("Content Security Policy")));

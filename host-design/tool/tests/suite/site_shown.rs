@@ -1,4 +1,4 @@
-//! What a person does first in the page, with the keyboard alone, on a telephone's width; and how much memory it takes.
+//! What a person does first in the page, with the keyboard alone, on a telephone's width.
 //!
 //! Runs where `UPRIGHT_REQUIRE_WASM=1` is set, and needs Chromium or Chrome.
 
@@ -6,9 +6,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::report_devtools::Browser;
-use crate::site_page::{TELEPHONE, opened, opened_in, root, type_in, until as until_designed, written};
-use crate::site_twin::balance;
-use crate::twin_page::{FASTEST, MACHINE, STATE, let_pass, set_speed, until, until_state};
+use crate::site_page::{TELEPHONE, opened_in, root, until as until_designed, written};
+use crate::twin_page::{MACHINE, STATE, let_pass, until, until_state};
 
 /// Presses Tab until an expression is true of the element that has the focus.
 fn tab_to(browser: &mut Browser, is_it: &str) {
@@ -108,33 +107,4 @@ fn the_papers_rig_is_typed_designed_exported_balanced_pulled_broken_and_put_back
         assert!(width.is_some_and(|width| width <= u64::from(TELEPHONE)), "it scrolls sideways: {width:?}");
     }
     assert_eq!(browser.errors(), Vec::<String>::new());
-}
-
-#[test]
-fn five_minutes_of_balancing_in_the_page_need_no_more_memory() {
-    let Some((mut browser, _folder)) = opened() else { return };
-    type_in(&mut browser, &without_comments("single-quanser-ip02.toml"));
-    until_designed(&mut browser, "upright.desk.design?.states === 4");
-    balance(&mut browser, true);
-    until_state(&mut browser, "Balancing");
-    set_speed(&mut browser, FASTEST);
-    // The scopes are filled after 82 s.
-    for _ in 0..5 {
-        let_pass(&mut browser, 20.0);
-    }
-    let (heap, resident) = (browser.heap(), browser.resident_kib());
-    let begin = Instant::now();
-    for _ in 0..15 {
-        let_pass(&mut browser, 20.0);
-    }
-    let (heap_after, resident_after) = (browser.heap(), browser.resident_kib());
-    eprintln!(
-        "300 s in {:.0} s: heap {heap} to {heap_after} bytes, processes of the pages {resident:?} to {resident_after:?} KiB",
-        begin.elapsed().as_secs_f64()
-    );
-    assert_eq!(browser.value(STATE), "Balancing");
-    assert!(heap_after < 1.02 * heap + 1e5, "the page grows from {heap} to {heap_after} bytes");
-    if let (Some(before), Some(after)) = (resident, resident_after) {
-        assert!((after as f64) < 1.1 * before as f64, "the thread grows from {before} to {after} KiB");
-    }
 }

@@ -93,6 +93,31 @@ pub(crate) fn balance(browser: &mut Browser, raised: bool) {
     browser.inside = Some(FRAME);
 }
 
+/// The first row of a recording that is not what the scopes draw at its tick; its header names quantities and units.
+fn unlike(csv: &str, drawn: &[Value]) -> Option<String> {
+    let mut rows = csv.lines();
+    let names = rows.next().unwrap();
+    assert!(names.starts_with("tick,state,fault,setpoint_m,requested_n,applied_n,drive,cycles,"), "{names}");
+    let mut names = names.split(',').skip(8);
+    assert_eq!(
+        names.by_ref().take(5).collect::<Vec<_>>(),
+        ["count0", "count1", "count2", "count3", "count4"]
+    );
+    assert_eq!(names.by_ref().take(10).last(), Some("estimate9"));
+    let is_drawn = |row: &&str| {
+        let cells: Vec<&str> = row.split(',').collect();
+        let tick: u64 = cells[0].parse().unwrap();
+        let Some(telemetry) = drawn.iter().find(|telemetry| telemetry["tick"] == tick) else { return false };
+        let numbers = |name: &str| telemetry[name].as_array().unwrap().clone();
+        let scalars = ["setpoint_m", "requested_n", "applied_n", "drive"].map(|name| telemetry[name].clone());
+        let lists = [numbers("counts"), numbers("estimate"), numbers("innovation")].concat();
+        let told = scalars.iter().chain(&lists).map(|value| value.as_f64().unwrap() as f32);
+        let written = cells[3..7].iter().chain(&cells[8..]).map(|cell| cell.parse().unwrap_or(f32::NAN));
+        telemetry["state"] == cells[1] && told.eq(written)
+    };
+    rows.find(|row| !is_drawn(row)).map(str::to_owned)
+}
+
 #[test]
 fn the_papers_rig_is_balanced_pulled_broken_and_put_back_in_the_page() {
     let Some((mut browser, _folder)) = opened() else { return };
@@ -119,7 +144,9 @@ fn the_papers_rig_is_balanced_pulled_broken_and_put_back_in_the_page() {
     click(&mut browser, "[data-restart=upright]");
     until_state(&mut browser, "Balancing");
     browser.value(
-        "{ window.made = []; URL.createObjectURL = (blob) => { window.made.push(blob); return 'blob:x'; }; }",
+        "{ window.made = []; URL.createObjectURL = (blob) => { window.made.push(blob); return 'blob:x'; }; \
+         window.drawn = []; const scopes = upright.scopes(); const push = scopes.push.bind(scopes); \
+         scopes.push = (telemetry, machine) => { drawn.push(telemetry); push(telemetry, machine); }; }",
     );
     click(&mut browser, "#record");
     until(&mut browser, "upright.seen.picture.recording");
@@ -127,8 +154,14 @@ fn the_papers_rig_is_balanced_pulled_broken_and_put_back_in_the_page() {
     click(&mut browser, "#record");
     until(&mut browser, "window.made.length === 1");
     let csv = browser.value("window.made[0].text()");
-    let rows: Vec<&str> = csv.as_str().unwrap().lines().collect();
-    assert!(rows[0].starts_with("tick,state") && rows.len() > 100, "{} rows, {}", rows.len(), rows[0]);
+    let (csv, drawn) = (csv.as_str().unwrap(), browser.value("drawn"));
+    assert!(csv.lines().count() > 100, "{csv}");
+    assert_eq!(unlike(csv, drawn.as_array().unwrap()), None);
+    // Negative control: another set-point in one row.
+    let (rows, last) = csv.trim_end().rsplit_once('\n').unwrap();
+    let other = last.replacen(",,", ",,1", 1);
+    assert_ne!(last, other);
+    assert!(unlike(&format!("{rows}\n{other}\n"), drawn.as_array().unwrap()).is_some());
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
@@ -166,4 +199,49 @@ fn a_hanging_single_is_homed_checked_jogged_and_raised_in_the_page_with_keys_alo
     click(&mut browser, "#close");
     assert_eq!(browser.value("document.querySelector('main').hidden"), false);
     assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn a_page_that_is_loaded_again_goes_on_with_its_run_and_scopes() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    type_in(&mut browser, &read("single-quanser-ip02.toml"));
+    until_designed(&mut browser, "upright.desk.design?.states === 4");
+    balance(&mut browser, true);
+    until_state(&mut browser, "Balancing");
+    // Something that only this run knows.
+    browser.value(
+        "{ const input = document.querySelector('input[name=\"mass\"]'); input.value = 7; \
+         input.dispatchEvent(new Event('input')); }",
+    );
+    until(&mut browser, &format!("{MACHINE}.properties.mass === 7"));
+    let_pass(&mut browser, 4.0);
+    let mut again = |prepare: &str| -> [f64; 3] {
+        browser.inside = None;
+        browser.value(&format!("addEventListener('pagehide', () => {{ {prepare} }})"));
+        let address = browser.value("location.href");
+        let t_s = browser
+            .value("document.querySelector('#twin iframe').contentWindow.upright.seen.picture.machine.t_s");
+        browser.open_address(address.as_str().unwrap(), 1280, "light", "screen");
+        until(
+            &mut browser,
+            &format!("document.querySelector('{FRAME}')?.contentWindow?.upright?.seen?.picture"),
+        );
+        browser.inside = Some(FRAME);
+        until_state(&mut browser, "Balancing");
+        let now = browser
+            .value(&format!("[{MACHINE}.t_s, {MACHINE}.properties.mass, upright.scopes().history.length]"));
+        assert_eq!(browser.errors(), Vec::<String>::new());
+        let [now_s, mass, messages]: [f64; 3] = serde_json::from_value(now).unwrap();
+        [now_s - t_s.as_f64().unwrap(), mass, messages]
+    };
+    let [later_s, mass, messages] = again("");
+    assert!(
+        later_s > -2.0 && mass == 7.0 && messages > 500.0,
+        "{later_s} s later, {mass} %, {messages} messages"
+    );
+    // Negative control: what was kept of another module or rig is not put into this one.
+    let other = "const kept = JSON.parse(sessionStorage.getItem('upright run')); kept.kept.sum += 1; \
+                 sessionStorage.setItem('upright run', JSON.stringify(kept));";
+    let [later_s, mass, _] = again(other);
+    assert!(later_s < -2.0 && mass == 0.0, "{later_s} s later, {mass} %");
 }

@@ -1,8 +1,12 @@
 // Balance it: the twin's page inside this one, and the thread that runs its rig.
 
+const RUN = 'upright run'; // names in the tab's store
+const SCOPES = 'upright scopes';
+
 class Twin {
   constructor(module, failed) {
-    Object.assign(this, { module, failed, frame: null, thread: null, line: null });
+    Object.assign(this, { module, failed, frame: null, thread: null, line: null, kept: null });
+    addEventListener('pagehide', () => this.keep());
     byId('close').addEventListener('click', () => this.close());
     // Stop works wherever the focus is.
     document.addEventListener('keydown', (event) => {
@@ -12,9 +16,11 @@ class Twin {
 
   // Switches the rig on: its file, its stored motions (or null), and whether a hand raises it at first. With a serial
   // line it is the real one.
-  open(rig, line = null) {
+  open(rig, line = null, kept = null) {
     this.close();
     this.line = line;
+    this.kept = kept === null ? null : { rig, kept };
+    if (kept === null) store()?.removeItem(SCOPES);
     const { port1: here, port2: there } = new MessageChannel();
     this.frame = element('iframe', { srcdoc: JSON.parse(embedded('twin-page')), title: 'The rig under power' });
     this.frame.addEventListener('load', () => {
@@ -24,11 +30,26 @@ class Twin {
     this.show(true);
     byId('twin').append(this.frame);
     this.thread = new Thread(this.module);
-    this.thread.run(rig, JSON.parse(embedded('theme')), there, line?.there ?? null, ({ failed }) => {
+    this.thread.keep = (changes) => { this.kept = { rig, kept: changes }; };
+    this.thread.run({ rig, kept }, JSON.parse(embedded('theme')), there, line?.there ?? null, ({ failed }) => {
       if (failed === undefined) return;
       this.close();
       this.failed(failed.why);
     });
+  }
+
+  // A page that is loaded again goes on with the run. A store that is too small keeps nothing.
+  keep() {
+    store()?.removeItem(RUN);
+    if (this.kept === null) return;
+    const { rig, kept } = this.kept;
+    try { store()?.setItem(RUN, JSON.stringify({ rig, kept: { ...kept, bytes: lettersOf(kept.bytes) } })); } catch {}
+  }
+
+  // Goes on with what was kept, if it is of the rig file `toml`.
+  goOn(toml) {
+    const { rig, kept } = JSON.parse(store()?.getItem(RUN) ?? 'null') ?? {};
+    if (rig?.toml === toml) this.open(rig, null, { ...kept, bytes: bytesOfLetters(kept.bytes) });
   }
 
   show(isShown) {
@@ -41,7 +62,7 @@ class Twin {
     // The motor of a real rig is turned off before its thread ends.
     (line?.close() ?? Promise.resolve()).then(() => thread?.worker.terminate());
     this.frame?.remove();
-    [this.frame, this.thread, this.line] = [null, null, null];
+    [this.frame, this.thread, this.line, this.kept] = [null, null, null, null];
     this.show(false);
     byId('balance').focus();
   }

@@ -45,12 +45,14 @@ function checked(answer) {
   redesign();
 }
 
+// How the closed loop is disturbed in the run that is shown.
+const disturbed = () => ({ lean_rad: Number(byId('lean').value) / DEGREES, step_m: Number(byId('step').value) });
+
 function redesign() {
   for (const id of ['plots', 'gains', 'poles']) byId(id).classList.add('old');
   const toml = editor.value;
   tell('designing …');
-  const question = { ask: 'design', toml, lean_rad: Number(byId('lean').value) / DEGREES, step_m: Number(byId('step').value) };
-  designer.ask('design', question, (answer, ms) => {
+  designer.ask('design', { ask: 'design', toml, ...disturbed() }, (answer, ms) => {
     if (answer.failed !== undefined) return tell(answer.failed.why, true);
     designed(answer, ms);
     return designer.ask('poles', { ask: 'poles', toml }, (poles) => {
@@ -95,7 +97,7 @@ function showLoop() {
     ['position (m)', [{ name: 'cart', value: state(0), colour: curveColour(0) }, { name: 'set-point', value: (row) => row[1], colour: 'var(--limit)' }]],
     ['angles (°)', desk.sketch.lengths_m.map((_, link) => ({ name: `link ${link + 1}`, value: state(2 + 2 * link, DEGREES), colour: curveColour(link) }))],
     [desk.sketch.input, [{ name: 'applied', value: (row) => row[2], colour: curveColour(1) }]],
-  ].filter(([, curves]) => links > 0 || curves[0].name === 'applied');
+  ].filter(([, curves]) => links > 0 || curves[0]?.name === 'applied');
   byId('plots').replaceChildren(...plots.map(([title, curves]) => {
     const caption = element('figcaption', { textContent: title });
     for (const { name, colour } of curves) {
@@ -170,23 +172,16 @@ function save(name, text, type = 'text/plain') {
   setTimeout(() => URL.revokeObjectURL(address), 10e3);
 }
 
-// What `upright design` and `upright export` write.
+// What `upright design`, `upright export` and `upright simulate --csv` write.
 async function exported(kind) {
-  const answer = await designer.answerTo({ ask: kind, toml: editor.value });
+  const answer = await designer.answerTo({ ask: kind, toml: editor.value, law: byId('law').value, ...disturbed() });
   if (answer.failed !== undefined) tell(answer.failed.why, true);
   return answer.text ?? null;
 }
 
-async function saveExported(kind, name) {
+async function saveExported(kind, name, type) {
   const text = await exported(kind);
-  if (text !== null) save(name, text);
-}
-
-function csvOfRun() {
-  const { rows } = chosen().run;
-  const states = rows[0][3].map((_, state) => `state${state}`);
-  const lines = rows.map(([t, setpoint, force, state]) => [t, setpoint, force, ...state].join());
-  return `${['t_s', 'setpoint_m', desk.sketch.input, ...states].join()}\n${lines.join('\n')}\n`;
+  if (text !== null) save(name, text, type);
 }
 
 // The stored motions of the example that the rig began as; they are used if it has not changed.
@@ -197,16 +192,14 @@ function motions() {
 
 // The rig in the address, behind the mark that is never sent to a server.
 function linkToRig() {
-  const bytes = new TextEncoder().encode(editor.value);
-  const code = btoa(String.fromCharCode(...bytes)).replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
+  const code = lettersOf(new TextEncoder().encode(editor.value)).replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
   return `${location.href.split('#')[0]}#rig=${code}`;
 }
 
 function rigOfLink() {
   const code = /^#rig=([A-Za-z0-9_-]+)$/.exec(location.hash)?.[1];
   if (code === undefined) return null;
-  const text = atob(code.replaceAll('-', '+').replaceAll('_', '/'));
-  return new TextDecoder().decode(Uint8Array.from(text, (letter) => letter.charCodeAt(0)));
+  return new TextDecoder().decode(bytesOfLetters(code.replaceAll('-', '+').replaceAll('_', '/')));
 }
 
 function listen() {
@@ -228,7 +221,7 @@ function listen() {
   byId('law').addEventListener('change', () => { showLoop(); showDesign(); trust.show(); });
   byId('play').addEventListener('click', () => { desk.at = 0; play(); });
   byId('balance').addEventListener('click', () => {
-    twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked });
+    twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked, since_1970_s: Date.now() / 1e3 });
   });
   byId('connect').hidden = navigator.serial === undefined;
   byId('no-serial').hidden = navigator.serial !== undefined;
@@ -242,7 +235,7 @@ function listen() {
   byId('save-rig').addEventListener('click', () => save(`${desk.sketch?.rig ?? 'rig'}.toml`, editor.value));
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
   byId('save-header').addEventListener('click', () => saveExported('header', 'controller.h'));
-  byId('save-csv').addEventListener('click', () => save('run.csv', csvOfRun(), 'text/csv'));
+  byId('save-csv').addEventListener('click', () => saveExported('csv', 'run.csv', 'text/csv'));
   byId('link').addEventListener('click', async () => {
     history.replaceState(null, '', linkToRig());
     await navigator.clipboard?.writeText(location.href).catch(() => {});
@@ -262,17 +255,12 @@ function open(text) {
   changed();
 }
 
-// The tab's store, from which a page that is loaded again takes its rig; null where the person forbids it.
-function kept() {
-  try { return sessionStorage; } catch { return null; }
-}
-
 async function begin() {
   listen();
   const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
   byId('example').value = first.name;
-  editor.set(rigOfLink() ?? kept()?.getItem(KEPT) ?? first.toml);
-  addEventListener('pagehide', () => kept()?.setItem(KEPT, editor.value));
+  editor.set(rigOfLink() ?? store()?.getItem(KEPT) ?? first.toml);
+  addEventListener('pagehide', () => store()?.setItem(KEPT, editor.value));
   const module = bytesOf('module');
   checker = new Thread(module);
   designer = new Thread(module);
@@ -284,8 +272,9 @@ async function begin() {
   };
   new Lessons(begins, (question) => designer.answerTo(question));
   changed();
+  twin.goOn(editor.value);
 }
 
 // For tests, and for the curious.
-globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
+globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, keptBytes: () => twin.kept?.kept.bytes.length ?? 0, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
 begin().catch((error) => tell(`this browser cannot compute the design: ${error.message}`, true));

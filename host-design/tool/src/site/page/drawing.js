@@ -27,8 +27,8 @@ function drawRig(place, { lengths_m: lengths, travel_m: travel }, state, setpoin
     return;
   }
   const reach = lengths.reduce((sum, length) => sum + length, 0);
-  const scale = (0.74 * height) / reach;
-  const [x0, y0] = [width / 2, 0.86 * height];
+  const [x0, y0] = [width / 2, height - 40];
+  const scale = (0.88 * y0) / reach;
   const at = ([x, y]) => [x0 + scale * x, y0 - scale * y];
   const parts = [];
   const line = (from, to, stroke, thickness) => {
@@ -105,16 +105,19 @@ function drawPoles(place, poles) {
   place.setAttribute('viewBox', `0 0 ${width} ${height}`);
   const farthest = Math.max(...poles.map(([re, im]) => Math.max(Math.abs(re), Math.abs(im))), 1e-3);
   const near = (value) => Math.sign(value) * Math.sqrt(Math.abs(value) / farthest);
-  const [x0, y0] = [0.82 * width, height / 2];
-  const at = ([re, im]) => [x0 + 0.76 * width * near(re), y0 - 0.42 * height * near(im)];
+  const [x0, y0] = [0.82 * width, height / 2 - 8];
+  const at = ([re, im]) => [x0 + 0.76 * width * near(re), y0 - 0.4 * height * near(im)];
   const parts = [
     svg('line', { x1: 8, x2: width - 8, y1: y0, y2: y0, stroke: 'var(--rule)' }),
-    svg('line', { x1: x0, x2: x0, y1: 6, y2: height - 6, stroke: 'var(--ink)' }),
+    svg('line', { x1: x0, x2: x0, y1: 6, y2: height - 22, stroke: 'var(--ink)' }),
   ];
+  let free = -Infinity;
   for (let power = Math.floor(Math.log10(farthest)); 10 ** power > farthest / 3e3; power -= 1) {
     const [x] = at([-(10 ** power), 0]);
+    if (x < free) continue;
+    free = x + 40;
     parts.push(svg('line', { x1: x, x2: x, y1: y0 - 4, y2: y0 + 4, stroke: 'var(--muted)' }));
-    parts.push(svg('text', { x, y: y0 + 18, 'text-anchor': 'middle' }, `−${Number((10 ** power).toPrecision(3))}`));
+    parts.push(svg('text', { x, y: height - 6, 'text-anchor': 'middle' }, `−${Number((10 ** power).toPrecision(3))}`));
   }
   for (const pole of poles) {
     const [x, y] = at(pole);

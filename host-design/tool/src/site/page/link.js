@@ -2,8 +2,22 @@
 
 const embedded = (id) => document.getElementById(id).textContent;
 
+// Bytes as base64, and back.
+const bytesOfLetters = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
+function lettersOf(bytes) {
+  let text = '';
+  for (let from = 0; from < bytes.length; from += 8192) text += String.fromCharCode(...bytes.subarray(from, from + 8192));
+  return btoa(text);
+}
+
 // What is embedded as base64 of packed bytes.
-const bytesOf = (id) => decoded(Uint8Array.from(atob(embedded(id).trim()), (letter) => letter.charCodeAt(0)));
+const bytesOf = (id) => decoded(bytesOfLetters(embedded(id).trim()));
+
+// The tab's store, from which a page that is loaded again goes on; null where the person forbids it.
+function store() {
+  try { return sessionStorage; } catch { return null; }
+}
 
 // A thread that computes. Of several questions that wait, only the last of each kind is asked.
 class Thread {
@@ -13,10 +27,10 @@ class Thread {
     this.waiting = new Map();
     this.asked = null;
     this.worker.onmessage = ({ data }) => {
+      if (data.kept !== undefined) return this.keep?.(data.kept);
       const { take } = this.asked;
       this.asked = null;
-      take(data.answer, data.ms);
-      this.next();
+      try { take(data.answer, data.ms); } finally { this.next(); }
     };
     this.ready = new Promise((take) => { this.asked = { take }; });
     this.worker.postMessage({ id: 0, module });
@@ -31,11 +45,12 @@ class Thread {
     this.next();
   }
 
-  // Runs a rig, or talks to the board at a line, for the page at the other end of the port.
-  run(rig, theme, port, line, take) {
+  // Runs a rig, from what was kept of it or null, or talks to the board at a line, for the page at the other end of the
+  // port.
+  run({ rig, kept }, theme, port, line, take) {
     this.ready.then(() => {
       this.asked = { take };
-      this.worker.postMessage({ id: 'run', rig, theme }, line === null ? [port] : [port, line]);
+      this.worker.postMessage({ id: 'run', rig, theme, kept }, line === null ? [port] : [port, line]);
     });
   }
 

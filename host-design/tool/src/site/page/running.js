@@ -6,10 +6,48 @@ const BUDGET_MS = 14;
 // Longest silence of the page while the motor may move.
 const SILENCE_MS = 2e3;
 
-// Switches a rig on and keeps it running; returns why it cannot, if it cannot.
-function run(rig, theme, port) {
-  const told = answered('twin', { twin: 'start', since_1970_s: Date.now() / 1e3, ...rig });
+// Time between two moments from which a page that is loaded again goes on.
+const KEPT_MS = 1e3;
+const BLOCK = 1024; // words
+
+// What a run has changed in the memory since the power came on. The same rig switched on again has the same memory, bit
+// by bit, and goes on where these changes are put back.
+class Changes {
+  constructor() {
+    this.first = new Uint32Array(exported.memory.buffer.slice(0));
+    this.sum = this.first.reduce((sum, word) => Math.imul(sum ^ word, 0x01000193), 0);
+  }
+
+  taken() {
+    const now = new Uint32Array(exported.memory.buffer);
+    const isChanged = (block) => {
+      const end = (block + 1) * BLOCK;
+      for (let word = block * BLOCK; word < end; word += 1) if (now[word] !== (this.first[word] ?? 0)) return true;
+      return false;
+    };
+    const blocks = Array.from({ length: now.length / BLOCK }, (_, block) => block).filter(isChanged);
+    const words = new Uint32Array(blocks.length * BLOCK);
+    blocks.forEach((block, k) => words.set(now.subarray(block * BLOCK, (block + 1) * BLOCK), k * BLOCK));
+    return { sum: this.sum, size: now.byteLength, blocks, bytes: new Uint8Array(words.buffer) };
+  }
+
+  // Another module, or another beginning, is left as it is.
+  put({ sum, size, blocks, bytes }) {
+    if (sum !== this.sum) return;
+    exported.memory.grow((size - exported.memory.buffer.byteLength) / 65536);
+    const now = new Uint8Array(exported.memory.buffer);
+    blocks.forEach((block, k) => now.set(bytes.subarray(4 * k * BLOCK, 4 * (k + 1) * BLOCK), 4 * block * BLOCK));
+  }
+}
+
+// Switches a rig on and keeps it running, from what was kept of it, if that is not null; returns why it cannot, if it
+// cannot.
+function run(rig, theme, port, kept) {
+  const told = answered('twin', { twin: 'start', ...rig });
   if (told.failed !== undefined) return told;
+  const changes = new Changes();
+  if (kept !== null) changes.put(kept);
+  let keptAt = performance.now();
   port.postMessage({ you: told.you, hello: { ...told.hello, theme } });
   let [asked, last, heard, tickMs, t] = [[], performance.now(), performance.now(), 0.02, 0];
   port.onmessage = ({ data }) => {
@@ -30,6 +68,11 @@ function run(rig, theme, port) {
     } catch (error) {
       port.postMessage({ notice: `the computation stopped (${error.message}); go back to the desk and balance it again` });
       return;
+    }
+    if (begin - keptAt > KEPT_MS) {
+      keptAt = begin;
+      const kept = changes.taken();
+      postMessage({ kept }, [kept.bytes.buffer]);
     }
     setTimeout(step, Math.max(0, begin + PICTURE_MS - performance.now()));
   };

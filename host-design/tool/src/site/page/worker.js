@@ -19,12 +19,12 @@ function answered(name, question) {
   return JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, from, length)));
 }
 
-onmessage = async ({ data: { id, question, module, rig, theme }, ports: [port, line] }) => {
+onmessage = async ({ data: { id, question, module, rig, theme, kept }, ports: [port, line] }) => {
   const begin = performance.now();
   try {
     if (module !== undefined) bytes = module;
     if (exported === null) await start();
-    if (rig !== undefined) return postMessage({ id, answer: line === undefined ? run(rig, theme, port) : talk(rig, theme, port, line), ms: performance.now() - begin });
+    if (rig !== undefined) return postMessage({ id, answer: line === undefined ? run(rig, theme, port, kept) : talk(rig, theme, port, line), ms: performance.now() - begin });
     const answer = question === undefined ? {} : answered('answer', question);
     postMessage({ id, answer, ms: performance.now() - begin });
   } catch (error) {

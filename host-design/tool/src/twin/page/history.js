@@ -27,6 +27,14 @@ export class History {
     this.known = new Uint8Array(CAPACITY);
     this.curves = curves;
     this.length = 0;
+    this.oldest = 0;
+  }
+
+  // Forgets what was at a time or later.
+  cut(t) {
+    const { first } = this;
+    this.length = this.after(t);
+    this.oldest = first;
   }
 
   // `state` is the true one, or what the encoders say.
@@ -43,18 +51,19 @@ export class History {
 
   get rows() { return [this.times, this.known, ...this.values, ...this.seen.filter((row) => row !== null)]; }
 
-  kept() { return { length: this.length, rows: this.rows.map(letters) }; }
+  kept() { return { length: this.length, oldest: this.oldest, rows: this.rows.map(letters) }; }
 
   // What was kept, and after it a gap of unknown length, in which nothing is drawn.
-  restore({ length, rows }) {
+  restore({ length, oldest, rows }) {
     if (length === 0) return;
+    this.oldest = oldest;
     this.rows.forEach((row, i) => new Uint8Array(row.buffer).set(Uint8Array.from(atob(rows[i]), (letter) => letter.charCodeAt(0))));
     this.length = length + 1;
     for (const row of this.rows) row[length % CAPACITY] = NaN;
     this.times[length % CAPACITY] = this.time(length - 1);
   }
 
-  get first() { return Math.max(0, this.length - CAPACITY); }
+  get first() { return Math.max(this.oldest, this.length - CAPACITY); }
 
   time(index) { return this.times[index % CAPACITY]; }
 

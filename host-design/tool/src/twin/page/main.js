@@ -9,7 +9,7 @@ import { Controls } from './controls.js';
 import { Drawers } from './drawers.js';
 
 const byId = (id) => document.getElementById(id);
-const MOTOR_MS = 150; // time between two texts of the motor's force
+const MOTOR_MS = 150; // time between two texts of what the motor does
 const KEPT = 'upright scopes'; // name in the tab's store
 
 const seen = { you: null, picture: null, telemetry: null, frames: 0, step: 0, since: -MOTOR_MS };
@@ -69,10 +69,8 @@ const witness = new Witness();
 const controls = new Controls(ask, wish);
 const drawers = new Drawers((what) => controls.machine(what));
 
-// A page that is loaded again shows the curves of the page before: the address is that of the same run. A run inside
-// a page ends with that page.
+// A page that is loaded again shows the curves of the page before: the address is that of the same run.
 function remember() {
-  if (location.protocol === 'about:') return;
   let store = null;
   try { store = sessionStorage; } catch { return; } // forbidden by the person
   const kept = store.getItem(KEPT);
@@ -92,7 +90,7 @@ function motor(latest, force) {
   else if (performance.now() - seen.since < MOTOR_MS) return;
   seen.since = performance.now();
   byId('motor').textContent = { fault: '✕ Motor off: fault', off: '○ Motor off' }[state]
-    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} N`;
+    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} ${hello.input[1]}`;
 }
 
 function frame() {

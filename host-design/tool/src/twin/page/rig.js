@@ -4,6 +4,7 @@ import { colour } from './colours.js';
 import { newtons } from './guide.js';
 
 const NEAR_PX = 28; // how near the pointer has to be to a body
+const BELOW_PX = 64; // of the rail's numbers and the set-point, below the cart
 const CART = { width: 0.14, height: 0.07 }; // in lengths of the chain
 const KEY_PULL = 0.35; // pull by an arrow key, in lengths of the chain
 // Part of the way to where the camera is aimed that it moves in a frame; with reduced motion, it cuts.
@@ -61,7 +62,9 @@ export class RigView {
     const usual = Math.min(height / ((isUp ? 1.6 : 2.5) * this.reach), width / ((isUp ? 1.2 : 2.2) * this.reach));
     const whole = (0.92 * width) / (high - low);
     const fits = whole > TO_SHRINK * usual;
-    const wanted = { scale: fits ? Math.min(usual, whole) : usual, x: fits ? (low + high) / 2 : state[0], y: isUp ? 0.45 * this.reach : 0 };
+    const scale = fits ? Math.min(usual, whole) : usual;
+    const y = isUp ? Math.min(0.45 * this.reach, (height / 2 - BELOW_PX) / scale) : 0;
+    const wanted = { scale, x: fits ? (low + high) / 2 : state[0], y };
     this.rail.hidden = fits;
     if (this.camera === null) this.camera = wanted;
     // It does not move while the person pulls.

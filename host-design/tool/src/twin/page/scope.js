@@ -108,9 +108,9 @@ export class Scopes {
 
   push(telemetry, machine) {
     const t = telemetry.tick * this.hello.tick_s;
-    if (t < this.history.last) { // the firmware has started again
-      this.history.length = 0;
-      this.events.length = 0;
+    if (t < this.history.last) { // the firmware has started again, or a run goes on from what was kept of it
+      this.history.cut(t);
+      this.events = this.events.filter((event) => event.t < t);
     }
     const isKnown = isHomed(telemetry) || telemetry.state === 'Fault';
     const state = isKnown ? machine?.state ?? (isHomed(telemetry) ? this.measured(telemetry) : null) : null;

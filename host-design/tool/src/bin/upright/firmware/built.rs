@@ -28,15 +28,20 @@ pub(super) fn built_for_pico(
     let Some(path) = rig else {
         return Err(Failure::argument("name a rig file: an image for a pico is built from one"));
     };
-    let (rig, table) = designed(path, wanted)?;
+    let rig = Rig::from_path(path)?;
+    let table = table_of(&rig, path, wanted)?;
     Ok(with_spinner("building the image", || image::build_pico(board, &rig, &table))?)
 }
 
-/// Reads this rig file and designs its table, with the stored motions.
+/// Reads this rig file and designs its table, with the stored motions. Refuses a drive that takes pulses.
 pub(super) fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
     rig.refuse_acceleration("firmware")?;
-    let (_, table) = with_table(&rig, path, Gains::Sampled)?;
-    let table = with_stored_motions(path, &rig, table, wanted)?;
+    let table = table_of(&rig, path, wanted)?;
     Ok((rig, table))
+}
+
+fn table_of(rig: &Rig, path: &Path, wanted: Wanted) -> Result<TableValues, Failure> {
+    let (_, table) = with_table(rig, path, Gains::Sampled)?;
+    with_stored_motions(path, rig, table, wanted)
 }

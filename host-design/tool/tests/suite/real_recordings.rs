@@ -1,0 +1,127 @@
+//! `upright identify` with extracts of published recordings of real machines; licences and sources are beside them.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::command::{path_of, status, stderr, stdout, upright};
+
+/// Paths of the recordings `name`-`number`.
+fn recordings(name: &str, numbers: &[&str]) -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings");
+    numbers.iter().map(|number| format!("{}/{name}-{number}.csv", folder.display())).collect()
+}
+
+/// A rig file of the machine that knows next to nothing of it, as in docs/results/identified.md.
+fn ignorant(name: &str, folder: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(path_of(name)).unwrap();
+    let mut ignorant = String::new();
+    for line in text.split("[reality]").next().unwrap().lines() {
+        let line = match line.split(' ').next() {
+            Some("length_m") => "length_m = 0.3",
+            Some("inertia_kg_m2") => "inertia_kg_m2 = 0.002",
+            Some("friction_n_m_s_per_rad") => "friction_n_m_s_per_rad = 0",
+            _ => line,
+        };
+        writeln!(ignorant, "{line}").unwrap();
+    }
+    let file = folder.join("ignorant.toml");
+    std::fs::write(&file, ignorant).unwrap();
+    file
+}
+
+/// What identification says of the machine of `file`, and its exit status.
+fn identified(file: &Path, used: &[String], unused: &[String], options: &[&str]) -> (Value, i32) {
+    let mut arguments = vec!["identify", file.to_str().unwrap()];
+    arguments.extend(used.iter().map(String::as_str));
+    arguments.extend(["--json", "--clamped"].iter().chain(options));
+    arguments.push("--predict");
+    arguments.extend(unused.iter().map(String::as_str));
+    let output = upright(&arguments);
+    let all =
+        serde_json::from_str(stdout(&output)).unwrap_or_else(|error| panic!("{error}: {}", stderr(&output)));
+    (all, status(&output))
+}
+
+const ABSOLUTE: [&str; 6] = ["--angles", "absolute", "--zero", "upright", "--period", "0.004"];
+
+/// The number found of a parameter.
+fn found(all: &Value, name: &str) -> f64 {
+    let of = all["estimates"].as_array().unwrap().iter().find(|one| one["name"] == name);
+    of.unwrap_or_else(|| panic!("{name} in {all}"))["found"].as_f64().unwrap()
+}
+
+/// Errors of the unused recordings over windows of this length, in percent of the range of each joint.
+fn percents(all: &Value, window_s: f64) -> Vec<f64> {
+    let windows = all["predicted"].as_array().unwrap().iter().find(|one| one["window_s"] == window_s);
+    let channels = windows.unwrap()["channels"].as_array().unwrap();
+    channels.iter().map(|channel| channel["percent_found"].as_f64().unwrap()).collect()
+}
+
+fn below(errors: &[f64], most: &[f64]) {
+    assert_eq!(errors.len(), most.len());
+    assert!(errors.iter().zip(most).all(|(error, most)| error < most), "{errors:?} {most:?}");
+}
+
+fn doubts(all: &Value) -> String {
+    all["doubts"].to_string()
+}
+
+#[test]
+fn a_real_single_pendulum_is_identified_and_its_unused_swing_predicted() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ignorant("single-multiarm", folder.path());
+    let (used, unused) = (recordings("single", &["1", "2", "3"]), recordings("single", &["4"]));
+    let (all, code) = identified(&file, &used, &unused, &ABSOLUTE);
+    assert_eq!(code, 0, "{all}");
+    let dry = found(&all, "dry friction, joint 1");
+    assert!((4.9e-4..6.6e-4).contains(&dry), "{dry}");
+    assert!(found(&all, "viscous friction, joint 1") >= 0.0 && found(&all, "air drag, link 1") > 1e-5);
+    below(&percents(&all, 0.5), &[0.04]);
+    below(&percents(&all, 2.0), &[0.14]);
+    assert!(!doubts(&all).contains("left out"), "{all}");
+    // Without air drag, dry friction looks like viscous friction: that is said.
+    let without: Vec<&str> = ABSOLUTE.into_iter().chain(["--without-drag"]).collect();
+    let (all, _) = identified(&file, &used, &unused, &without);
+    assert_eq!(found(&all, "dry friction, joint 1"), 0.0);
+    assert!(doubts(&all).contains("left out: air drag, link 1"), "{all}");
+}
+
+#[test]
+fn a_real_triple_pendulum_is_identified_and_its_unused_swings_predicted() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ignorant("triple-multiarm", folder.path());
+    let used = recordings("triple", &["01", "03", "05", "07", "09", "11", "13", "15", "17"]);
+    let unused = recordings("triple", &["19", "20", "21", "22"]);
+    let (all, code) = identified(&file, &used, &unused, &ABSOLUTE);
+    assert_eq!(code, 0, "{all}");
+    let within = |name: &str, least: f64, most: f64| {
+        let value = found(&all, name);
+        assert!((least..most).contains(&value), "{name}: {value}");
+    };
+    within("dry friction, joint 2", 5.2e-4, 5.8e-4);
+    within("dry friction, joint 3", 0.0, 4e-5);
+    within("air drag, link 3", 2.1e-5, 2.6e-5);
+    below(&percents(&all, 0.5), &[0.05, 0.12, 0.045]);
+    below(&percents(&all, 2.0), &[0.24, 0.30, 0.16]);
+    // Without dry friction, parts of the recordings are predicted far worse from the others: nothing would be written.
+    let without: Vec<&str> = ABSOLUTE.into_iter().chain(["--without-dry"]).collect();
+    let (all, code) = identified(&file, &used, &unused, &without);
+    assert_eq!(code, 3, "{all}");
+    assert!(doubts(&all).contains("left out: dry friction, joint 2"), "{all}");
+}
+
+/// A double pendulum with a motor and a gear at each joint, whose rotors and gear friction are not in our model.
+#[test]
+fn a_machine_that_the_model_lacks_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(ignorant("double-multiarm", folder.path())).unwrap();
+    let file = folder.path().join("driven.toml");
+    std::fs::write(&file, text.replace("= 40000", "= 16471")).unwrap();
+    let (used, unused) = (recordings("driven-double", &["1", "2", "4"]), recordings("driven-double", &["3"]));
+    let (all, code) = identified(&file, &used, &unused, &["--angles", "relative", "--zero", "hanging"]);
+    assert_eq!(code, 3, "{all}");
+    assert!(all["refused"].as_str().unwrap().contains("does not fit"), "{all}");
+    assert!(doubts(&all).contains("The residuals of joint 2 are"), "{all}");
+}
