@@ -8,6 +8,8 @@ mod arithmetic;
 #[cfg_attr(not(rp2350), path = "rp2040.rs")]
 #[cfg_attr(rp2350, path = "rp2350.rs")]
 mod chip;
+#[cfg(not(rp2350))]
+mod copying;
 mod crash;
 mod encoders;
 mod guard;

@@ -17,7 +17,7 @@ const PULSES: [f64; 2] = [4096.0, 200e3];
 /// Longest tick in cycles while a rig of one to four links balances or rests, as measured in the emulator.
 pub const PICO_BALANCING_CYCLES: [u32; 4] = [15_000, 21_000, 27_000, 34_000];
 /// The same while it follows a motion.
-pub const PICO_MOTION_CYCLES: [u32; 4] = [29_500, 42_000, 58_000, 77_000];
+pub const PICO_MOTION_CYCLES: [u32; 4] = [29_500, 44_000, 60_000, 83_000];
 /// Largest share of a period that a tick may take (%).
 const MOST_PERCENT: f64 = 75.0;
 
