@@ -129,7 +129,7 @@ mod tests {
         assert!(refused(2, 2e-4, false).contains("0.5 to 100 ms"));
         assert_eq!(check(PicoBoard::Pico, 5, 1e-3, true, None), Ok(()));
         let four_links = refused(5, 7e-4, true);
-        assert!(four_links.contains("77000 cycles") && four_links.contains("88 %"), "{four_links}");
+        assert!(four_links.contains("83000 cycles") && four_links.contains("95 %"), "{four_links}");
         assert!(four_links.contains("--no-motions"), "{four_links}");
         assert_eq!(check(PicoBoard::Pico, 5, 5e-4, false, None), Ok(()));
         assert_eq!(check(PicoBoard::Pico2, 5, 1e-3, true, None), Ok(()));
