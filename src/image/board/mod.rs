@@ -3,8 +3,8 @@
 //! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
 //! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes;
 //! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; a `MemoryCheck` finds
-//! memory that has changed; `stop` turns the motor
-//! off for good; `CLOCK_HZ` is the core clock, `TICK_US` the range of ticks.
+//! memory that has changed; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock, `TICK_US` the range of
+//! ticks.
 
 #![allow(unsafe_code)]
 
