@@ -55,12 +55,14 @@ impl<T: Scalar> StepMap<T> {
     /// which begins at `speed` (m/s).
     pub fn limited(&self, wanted: T, speed: T, tick_s: T) -> T {
         let limited = saturate(wanted, self.acceleration_limit_m_per_s2);
-        let next = speed + limited * tick_s;
+        // A drive with lag is commanded more than the speed after the tick.
+        let lead_s = if self.lead_s > tick_s { self.lead_s } else { tick_s };
+        let next = speed + limited * lead_s;
         let within = saturate(next, self.speed_limit_m_per_s);
         if within == next {
             return limited;
         }
-        saturate((within - speed) / tick_s, self.acceleration_limit_m_per_s2)
+        saturate((within - speed) / lead_s, self.acceleration_limit_m_per_s2)
     }
 }
 
@@ -143,7 +145,8 @@ mod tests {
 
     #[test]
     fn neither_acceleration_nor_speed_exceeds_the_limits_of_the_drive() {
-        let drive = StepMap { step_m: 1e-5, acceleration_limit_m_per_s2: 8.0, speed_limit_m_per_s: 1.0 };
+        let drive =
+            StepMap { acceleration_limit_m_per_s2: 8.0, speed_limit_m_per_s: 1.0, ..StepMap::ideal(0.0625) };
         assert_eq!(drive.limited(5.0, 0.5, 0.0625), 5.0);
         assert_eq!(drive.limited(-50.0, 0.5, 0.0625), -8.0);
         assert_eq!(drive.limited(5.0, 0.75, 0.0625), 4.0);
@@ -152,6 +155,9 @@ mod tests {
         // Faster than allowed: it brakes as hard as it can.
         assert_eq!(drive.limited(5.0, 2.0, 0.0625), -8.0);
         assert_eq!(drive.limited(f32::NAN, 0.5, 0.0625), 0.0);
+        // With a lead of a quarter of a second, the command is 0.25 m/s above the cart's speed at 1 m/s².
+        let slow = StepMap { lag_s: 0.25, lead_s: 0.25, ..drive };
+        assert_eq!(slow.limited(5.0, 0.75, 0.0625), 1.0);
     }
 
     #[test]

@@ -284,7 +284,10 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             self.encoders.update(raw);
             return Self::off();
         };
-        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let mut y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        if !self.active.is_plain {
+            self.subtract_lead(&mut y);
+        }
         let requested = self.observe(&observer, &y, judge);
         self.actuate(requested)
     }
@@ -293,7 +296,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// sensors, or from somebody else's driver. The same positions give the same bits.
     pub fn control_at(&mut self, y: &[T; NY]) -> MotorCommand<T> {
         let Mode::Running(observer) = self.mode else { return Self::off() };
-        let requested = self.observe(&observer, y, |_, _, _| ());
+        let mut y = *y;
+        self.subtract_lead(&mut y);
+        let requested = self.observe(&observer, &y, |_, _, _| ());
         self.actuate(requested)
     }
 

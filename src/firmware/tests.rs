@@ -334,8 +334,12 @@ fn a_timer_with_another_tick_than_the_tables_keeps_the_motor_off_and_is_reported
 
 #[test]
 fn a_drive_with_pulses_stays_off_on_a_board_that_gives_none() {
-    let map =
-        crate::table::StepMap { step_m: 1e-5, acceleration_limit_m_per_s2: 10.0, speed_limit_m_per_s: 0.5 };
+    let map = crate::table::StepMap {
+        step_m: 1e-5,
+        acceleration_limit_m_per_s2: 10.0,
+        speed_limit_m_per_s: 0.5,
+        ..crate::table::StepMap::ideal(TICK_S)
+    };
     let mut table = GainTable { motor: None, steps: Some(map), delay_ticks: 0, ..TABLE };
     table.crc = table.checksum();
     assert_eq!(table.check(), Ok(()));

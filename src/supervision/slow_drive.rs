@@ -58,9 +58,13 @@ impl SlowDrive {
 mod tests {
     use super::*;
 
-    const MAP: StepMap =
-        StepMap { step_m: 1e-5, acceleration_limit_m_per_s2: 10.0, speed_limit_m_per_s: 0.5 };
     const TICK_S: f32 = 0.001;
+    const MAP: StepMap = StepMap {
+        step_m: 1e-5,
+        acceleration_limit_m_per_s2: 10.0,
+        speed_limit_m_per_s: 0.5,
+        ..StepMap::ideal(TICK_S)
+    };
 
     /// The pulses until the drive stands, and the number of ticks for which they come.
     fn until_rest(drive: &mut SlowDrive) -> (i32, u32) {

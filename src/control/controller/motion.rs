@@ -20,7 +20,8 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
             self.encoders.update(raw);
             return Self::off();
         };
-        let y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let mut y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        self.subtract_lead(&mut y);
         let e = &mut self.innovation.data.0[0];
         *e = observer.innovation(&y, &self.estimate.data.0[0]);
         judge(self.encoders.counts(), &y, e);
@@ -49,7 +50,11 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         if let Mode::Running(observer) = &self.mode {
             finish(self.encoders.counts(), &|| observer.measured(estimate), force);
         }
-        predict(estimate, self.applied);
+        let cart = self.cart_after_lag();
+        predict(&mut self.estimate.data.0[0], self.applied);
+        if let (Some(cart), Some(position)) = (cart, self.estimate.get_mut(0)) {
+            *position = cart;
+        }
     }
 
     /// Removes whole turns from the joints: from now on, the counter readings `raw` stand for the positions `counts`,

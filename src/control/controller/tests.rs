@@ -155,7 +155,12 @@ fn stepping() -> GainTable<2, 1> {
         measured: [0],
         step: vector![12.5e-6],
     };
-    let steps = StepMap { step_m: 12.5e-6, acceleration_limit_m_per_s2: 60.0, speed_limit_m_per_s: 1.5 };
+    let steps = StepMap {
+        step_m: 12.5e-6,
+        acceleration_limit_m_per_s2: 60.0,
+        speed_limit_m_per_s: 1.5,
+        ..StepMap::ideal(tick_s)
+    };
     let mut table = GainTable {
         tick_s,
         delay_ticks: 0,

@@ -2,10 +2,11 @@
 
 use super::diagnosis::{why_no_lqr, why_no_placement};
 use super::error::{DesignError, Task};
+use super::hold::Hold;
 use super::kalman::{Kalman, kalman};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
-use super::zero_order_hold::{mean_speed_cost, mean_speed_hold, sampled_cost, zero_order_hold};
+
 use crate::numerics::{Complex, Matrix, Real, Wide, eigenvalues, solve};
 use crate::plant::{ChainParameters, LinearModel, linearise};
 use crate::rig::{LinearPlant, Lqr, PlantDescription, PolePlacement, Rig};
@@ -107,9 +108,8 @@ impl<R: Real> Design<R> {
     ) -> Result<Self, DesignError> {
         let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
-        let (ad, held) = zero_order_hold(&a, &b, &period);
-        let is_force = rig.actuator.input().is_force();
-        let bd = if is_force { held } else { mean_speed_hold(&ad, &b, &period) };
+        let hold = Hold::of(rig);
+        let (ad, bd) = hold.sampled(&a, &b, &period);
         let output = rig.output();
         let late = rig.tick.delay_ticks == 1;
 
@@ -117,8 +117,7 @@ impl<R: Real> Design<R> {
         if let Some(weights) = &rig.lqr {
             let cost = match lqr_cost(weights) {
                 of_a_tick if weights.cost_is_sum => of_a_tick,
-                over_time if is_force => sampled_cost(&a, &b, &over_time, &period),
-                over_time => mean_speed_cost(&a, &b, &over_time, &period),
+                over_time => hold.cost(&a, &b, &over_time, &period),
             };
             let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));

@@ -14,13 +14,6 @@ pub fn zero_order_hold<R: Real>(a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<
     (transition.block(0, 0, states, states), transition.block(0, states, states, inputs))
 }
 
-/// Bd of `x⁺ = Ad x + Bd a` for a drive whose input is the cart's acceleration a, and which moves the cart during each
-/// tick at the mean speed that a gives it, `(Ad + 1) B t/2`: even pulses are a constant speed. The cart's speed, and
-/// the links' rates with it, jump by half of `a t` at the beginning of the tick and by the other half at its end.
-pub(crate) fn mean_speed_hold<R: Real>(ad: &Matrix<R>, b: &Matrix<R>, t: &R) -> Matrix<R> {
-    (&(ad * b) + b).scaled(&t.scale_by_power_of_two(-1))
-}
-
 /// `[A B; 0 0]`: the plant with its held inputs as further states.
 fn held<R: Real>(a: &Matrix<R>, b: &Matrix<R>) -> Matrix<R> {
     let size = a.rows() + b.cols();
@@ -52,17 +45,6 @@ pub fn sampled_cost<R: Real>(a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R
         r: integrated.block(states, states, inputs, inputs),
         s: integrated.block(0, states, states, inputs),
     }
-}
-
-/// [`sampled_cost`] for [`mean_speed_hold`]: after the first half of the jump, `B u t/2`, the state moves freely.
-pub(super) fn mean_speed_cost<R: Real>(a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R) -> Cost<R> {
-    let states = a.rows();
-    let without_input = Matrix::zeros(states, b.cols());
-    let free = sampled_cost(a, &without_input, cost, t);
-    let jump = b.scaled(&t.scale_by_power_of_two(-1));
-    let q_jump = &free.q * &jump;
-    let both = &jump.transpose() * &(&free.s + &free.s);
-    Cost { r: &(&free.r + &(&jump.transpose() * &q_jump)) + &both, s: &q_jump + &free.s, q: free.q }
 }
 
 #[cfg(test)]

@@ -172,6 +172,8 @@ fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
         out.float("step_m", steps.step_m);
         out.float("acceleration_limit_m_per_s2", steps.acceleration_limit_m_per_s2);
         out.float("speed_limit_m_per_s", steps.speed_limit_m_per_s);
+        out.float("lag_s", steps.lag_s);
+        out.float("lead_s", steps.lead_s);
     }
     supervision(&mut out, table);
     out.indices("measured", &observer.measured[..sensors]);

@@ -129,6 +129,9 @@ UPRIGHT_CALL upright_drive upright_control(upright_controller *c, const uint32_t
     if (c->state != UPRIGHT_BALANCING) {
         return 0;
     }
+#if UPRIGHT_HAS_STEPS
+    y[0] -= upright_table.lag_s * upright_speed(c);
+#endif
     upright_govern(c, upright_gains(c)->setpoint_step_m);
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
         c->innovation[i] = y[i] - c->estimate[upright_table.measured[i]];

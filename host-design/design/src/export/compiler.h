@@ -73,6 +73,7 @@ typedef struct {
 #endif
 #if UPRIGHT_HAS_STEPS
     float step_m, acceleration_limit_m_per_s2, speed_limit_m_per_s;
+    float lag_s, lead_s; /* of a drive that follows late; speed that is commanded above the cart's, per acceleration */
 #endif
     /* Limits. */
     float rail_m[2], angle_rad, speed_m_per_s, arm_angle_rad;

@@ -328,12 +328,13 @@ static inline float upright_limited(float requested, float speed)
 {
     const upright_table_type *t = &upright_table;
     float limited = upright_saturate(requested, t->acceleration_limit_m_per_s2);
-    float next = speed + limited * UPRIGHT_TICK_S;
+    float lead_s = t->lead_s > UPRIGHT_TICK_S ? t->lead_s : UPRIGHT_TICK_S;
+    float next = speed + limited * lead_s;
     float within = upright_saturate(next, t->speed_limit_m_per_s);
     if (within == next) {
         return limited;
     }
-    return upright_saturate((within - speed) / UPRIGHT_TICK_S, t->acceleration_limit_m_per_s2);
+    return upright_saturate((within - speed) / lead_s, t->acceleration_limit_m_per_s2);
 }
 
 /* The pulses that bring the cart to the step nearest to where the tick ends. What is rounded off is not lost. */
@@ -341,8 +342,9 @@ static inline upright_drive upright_actuate(upright_controller *c)
 {
     float speed = upright_speed(c);
     c->applied_n = upright_limited(c->requested_n, speed);
-    float mean = speed + 0.5f * c->applied_n * UPRIGHT_TICK_S;
-    int32_t target = upright_nearest_step(c->estimate[0] + mean * UPRIGHT_TICK_S, c->emitted);
+    float commanded_speed = speed + c->applied_n * upright_table.lead_s;
+    float commanded = c->estimate[0] + upright_table.lag_s * speed;
+    int32_t target = upright_nearest_step(commanded + commanded_speed * UPRIGHT_TICK_S, c->emitted);
     int32_t pulses = (int32_t)((uint32_t)target - (uint32_t)c->emitted);
     c->emitted = target;
     return pulses;

@@ -1,8 +1,7 @@
 //! The linear model of a candidate, in f64: ripple, and stability at every combination of mass errors.
 
 use crate::design::{
-    Design, DesignError, Kalman, continuous_plant, integrated_quadratic, mean_speed_hold, noise_columns,
-    zero_order_hold,
+    Design, DesignError, Hold, Kalman, continuous_plant, integrated_quadratic, noise_columns,
 };
 use crate::numerics::Matrix;
 use crate::rig::{Rig, Tolerances};
@@ -97,8 +96,8 @@ impl<'a> LinearPlants<'a> {
             if rig.actuator.input().is_force() {
                 return Ok(PlantModel::delayed(&plant.a, &plant.b, period_s, delay_ticks, &measured(rig)));
             }
-            let (ad, _) = zero_order_hold(&plant.a, &plant.b, &period_s);
-            Ok(held(rig, &ad, &mean_speed_hold(&ad, &plant.b, &period_s)))
+            let (ad, bd) = Hold::of(rig).sampled(&plant.a, &plant.b, &period_s);
+            Ok(held(rig, &ad, &bd))
         };
         (0..corners).map(corner).collect()
     }

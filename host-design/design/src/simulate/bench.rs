@@ -10,7 +10,11 @@ use super::error::SimulationError;
 use super::scenario::Scenario;
 use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
 use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
-use crate::rig::{Chain, PlantDescription, Rig};
+use crate::rig::{AccelerationDrive, Chain, PlantDescription, Rig};
+
+/// Parts of a servo's lag in which the acceleration of the cart is taken as constant, and the most of a tick.
+const PARTS_OF_A_LAG: f64 = 10.0;
+const MOST_PARTS: f64 = 1000.0;
 
 /// What is wrong with a drive that takes pulses. The board counts its pulses whatever it does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +41,8 @@ pub struct Bench {
     step_defect: Option<StepDefect>,
     /// Its motor, unless it goes where its pulses say.
     step_motor: Option<StepMotor>,
+    /// Its lag (s), if it is a servo that follows late.
+    servo_lag_s: Option<f64>,
     driver: Option<Driver>,
     timing: Timing,
     encoders: Option<RealEncoders>,
@@ -85,10 +91,11 @@ impl Bench {
             plant,
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
             step_m,
-            pulses: step_m.map_or(0, |step_m| nearest(scenario.start[0] / step_m)),
+            pulses: pulses_at(&scenario.start, step_m, servo_lag_s(rig)),
             missed: 0,
             step_defect: None,
             step_motor,
+            servo_lag_s: servo_lag_s(rig),
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
@@ -122,7 +129,7 @@ impl Bench {
     pub fn hold(&mut self, state: &[f64]) {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
-        self.pulses = self.step_m.map_or(0, |step_m| nearest(state[0] / step_m));
+        self.pulses = pulses_at(state, self.step_m, self.servo_lag_s);
         self.missed = 0;
     }
 
@@ -247,6 +254,10 @@ impl Bench {
         self.missed += missed as i64;
         let speed = arrive * step_m / self.period_s;
         let Some(motor) = &self.step_motor else {
+            if let Some(lag_s) = self.servo_lag_s {
+                self.follow(speed, lag_s);
+                return;
+            }
             self.plant.set_cart_speed(speed);
             self.plant.advance(0.0, &self.torques, self.period_s, self.substeps);
             self.plant.write_state(&mut self.state);
@@ -262,6 +273,18 @@ impl Bench {
             }
             let force = if is_on { motor.force_n(commanded, [self.state[0], self.state[1]]) } else { 0.0 };
             self.plant.advance(force + disturbance, &self.torques, self.period_s / parts as f64, 1);
+            self.plant.write_state(&mut self.state);
+        }
+    }
+
+    /// Simulates a tick in which the cart approaches a speed (m/s) with a lag of first order (s).
+    fn follow(&mut self, speed: f64, lag_s: f64) {
+        let parts =
+            (PARTS_OF_A_LAG * self.period_s / lag_s).ceil().clamp(self.substeps as f64, MOST_PARTS) as usize;
+        let part_s = self.period_s / parts as f64;
+        for _ in 0..parts {
+            let approached = -libm::expm1(-part_s / lag_s) * (speed - self.state[1]);
+            self.plant.advance(approached / part_s, &self.torques, part_s, 1);
             self.plant.write_state(&mut self.state);
         }
     }
@@ -352,6 +375,22 @@ impl Bench {
             (None, Drive::Duty(_), None) | (None, Drive::Steps(_), _) => 0.0,
         }
     }
+}
+
+/// The pulses that have been given to a drive whose cart is in this state: a servo's cart is behind its command.
+fn pulses_at(state: &[f64], step_m: Option<f64>, servo_lag_s: Option<f64>) -> i64 {
+    step_m
+        .map_or(0, |step_m| nearest((state[0] + servo_lag_s.map_or(0.0, |lag_s| lag_s * state[1])) / step_m))
+}
+
+/// The lag (s) of a servo in the real machine; none if it follows at once, or if its motor is described.
+fn servo_lag_s(rig: &Rig) -> Option<f64> {
+    let described = rig.actuator.acceleration.as_ref()?;
+    let real = AccelerationDrive {
+        bandwidth_hz: rig.reality.step_motor.bandwidth_hz.or(described.bandwidth_hz),
+        ..described.clone()
+    };
+    Some(real.lag_s()).filter(|&lag_s| lag_s > 0.0)
 }
 
 /// The nearest integer; of two equally near ones, that away from 0.

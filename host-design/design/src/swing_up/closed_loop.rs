@@ -188,14 +188,15 @@ fn measured(setting: &Setting<'_>, trial: &TrackingTrial, state: &[f64], sensor:
 
 /// What the actuator can deliver of a commanded force (N) or acceleration (m/s²), at a speed of the cart.
 fn applied(setting: &Setting<'_>, wanted: f64, speed: f64) -> f64 {
-    let Bounds { input: limit, motor, speed_m_per_s, .. } = setting.actuator;
+    let Bounds { input: limit, motor, speed_m_per_s, lead_s, .. } = setting.actuator;
     let within = |input: f64| input.max(-limit).min(limit);
     let input = within(wanted);
     match (motor, speed_m_per_s) {
         (Some([stall, loss]), _) => input.max(-stall - loss * speed).min(stall - loss * speed),
         (None, Some(fastest)) => {
-            let next = (speed + input * setting.tick_s).max(-fastest).min(fastest);
-            within((next - speed) / setting.tick_s)
+            let lead_s = lead_s.max(setting.tick_s);
+            let next = (speed + input * lead_s).max(-fastest).min(fastest);
+            within((next - speed) / lead_s)
         }
         (None, None) => input,
     }

@@ -16,6 +16,8 @@ pub(super) struct Bounds {
     pub(super) motor: Option<[f64; 2]>,
     /// Largest speed of the cart (m/s).
     pub(super) speed_m_per_s: Option<f64>,
+    /// Speed above that of the cart which a drive with lag is commanded per acceleration (s); it is limited, too.
+    pub(super) lead_s: f64,
     /// Ends of the rail (m).
     pub(super) rail_m: Option<[f64; 2]>,
 }
@@ -55,7 +57,8 @@ impl Bounds {
                 });
             }
             if let Some(speed) = self.speed_m_per_s {
-                limits.push(PlanLimit { speed: sign, bound: speed, name: "cart speed", ..free });
+                let input = sign * self.lead_s;
+                limits.push(PlanLimit { speed: sign, input, bound: speed, name: "cart speed", ..free });
             }
             if let Some([low, high]) = self.rail_m {
                 let bound = if sign > 0.0 { high } else { -low };
@@ -73,6 +76,7 @@ impl Bounds {
             input: self.input * factor,
             motor: self.motor.map(|[stall, loss]| [stall * factor, loss]),
             speed_m_per_s: self.speed_m_per_s.map(|speed| speed * factor),
+            lead_s: self.lead_s,
             rail_m: self.rail_m.map(|ends| ends.map(|end| end * factor)),
         }
     }

@@ -107,6 +107,7 @@ impl<'a> Setting<'a> {
                 input,
                 motor: rig.actuator.motor.as_ref().map(motor),
                 speed_m_per_s: drive.and_then(|drive| drive.largest_speed_m_per_s(tick_s)),
+                lead_s: drive.filter(|drive| drive.lag_s() > 0.0).map_or(0.0, |drive| drive.lead_s(tick_s)),
                 rail_m: Some(chain.cart.travel_m),
             },
             disturbance: Disturbance::of(rig),

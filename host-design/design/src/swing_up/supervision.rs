@@ -58,7 +58,8 @@ pub(super) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
         // The innovation from the rig's noise at rest adds to that from a wrong model in motion.
         let wider = 1.0 + (MARGIN * innovation) as f32 / thresholds.innovation[sensor];
         thresholds.innovation[sensor] *= wider;
-        thresholds.frozen[sensor] = (thresholds.frozen[sensor] * wider).max((MARGIN * moved) as f32);
+        let frozen = (thresholds.frozen[sensor] * wider).max((MARGIN * moved) as f32);
+        thresholds.frozen[sensor] = frozen.min(f32::MAX);
     }
     thresholds.motor.energy *= (thresholds.innovation[of_motor] / before).powi(2);
     Ok(())

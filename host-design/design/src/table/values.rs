@@ -312,6 +312,8 @@ fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable
         speed_limit_m_per_s: drive
             .largest_speed_m_per_s(period_s)
             .map_or(Ok(f32::MAX), |limit| finite("actuator.speed_limit_m_per_s", limit as f32))?,
+        lag_s: finite("the drive's lag", drive.lag_s() as f32)?,
+        lead_s: finite("the drive's lead", drive.lead_s(period_s) as f32)?,
     })
 }
 

@@ -20,6 +20,7 @@ fn stepper(name: &str, weight: f64, period_s: f64) -> Rig {
         step_m: 12.5e-6,
         speed_limit_m_per_s: Some(0.5),
         step_rate_limit_hz: None,
+        bandwidth_hz: None,
     };
     rig.actuator = Actuator { acceleration: Some(drive), ..Actuator::default() };
     rig.tick.period_s = period_s;

@@ -137,6 +137,8 @@ mod tests {
             step_m: 5e-5,
             acceleration_limit_m_per_s2: 8.0,
             speed_limit_m_per_s,
+            lag_s: 0.0,
+            lead_s: 5e-3,
         };
         assert_eq!(check(PicoBoard::Pico, 2, 1e-2, false, Some(&steps(5.0))), Ok(()));
         let fast = check(PicoBoard::Pico, 2, 1e-2, false, Some(&steps(15.0))).unwrap_err().to_string();

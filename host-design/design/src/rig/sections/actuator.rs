@@ -73,10 +73,26 @@ keys! {
             "largest speed that the drive is asked for", Absent::Follows("no limit");
         step_rate_limit_hz: Option<f64>, "Hz", Rule::POSITIVE,
             "largest rate of pulses", Absent::Follows("no limit");
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bandwidth_hz: Option<f64>, "Hz", Rule::POSITIVE,
+            "bandwidth of a servo, which follows its speed with a lag of first order", Absent::Follows("it follows at once");
     }
 }
 
 impl AccelerationDrive {
+    /// Time constant (s) with which it follows its speed; 0 without a bandwidth.
+    pub fn lag_s(&self) -> f64 {
+        self.bandwidth_hz.map_or(0.0, |hz| 1.0 / (core::f64::consts::TAU * hz))
+    }
+
+    /// Speed above that of the cart which is commanded per acceleration (s), see [`StepMap`](upright::table::StepMap).
+    pub fn lead_s(&self, period_s: f64) -> f64 {
+        match self.lag_s() {
+            0.0 => 0.5 * f64::from(period_s as f32),
+            lag_s => -period_s / libm::expm1(-period_s / lag_s),
+        }
+    }
+
     /// Largest speed (m/s): the smaller of the file's limit and what the rate of pulses allows, where given. A tick of
     /// `period_s` (s) has up to a pulse more than its speed needs, because positions are rounded to steps.
     pub fn largest_speed_m_per_s(&self, period_s: f64) -> Option<f64> {

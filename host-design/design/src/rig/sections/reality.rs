@@ -93,6 +93,8 @@ keys! {
             "travel of the cart per full step of the motor", Absent::RequiredIf("with holding_force_n");
         corner_speed_m_per_s: Option<f64>, "m/s", Rule::POSITIVE,
             "speed at which 71 % of that force is left", Absent::Follows("the force does not fall");
+        bandwidth_hz: Option<f64>, "Hz", Rule::POSITIVE,
+            "real bandwidth of a servo", Absent::Follows("that of [actuator]");
         motor_damping_percent: f64, "%", Rule::NOT_NEGATIVE,
             "damping of the motor's resonance with the cart", Absent::Numbers(&[10.0]);
     }
@@ -223,6 +225,10 @@ fn step_motor(table: &Table<'_>, motor: &StepMotorData, chain: &Chain) -> Result
         Some(node) if chain.cart.mass_kg.is_none() => Err(node.out_of_range(
             "only with mass_kg of [cart]",
             "give the mass that the motor moves, rotor included",
+        )),
+        Some(_) if motor.bandwidth_hz.is_some() => Err(table.required("bandwidth_hz")?.out_of_range(
+            "only without holding_force_n",
+            "leave one of them out: the drive is a servo, or a step motor",
         )),
         Some(_) if motor.full_step_m.is_none() => {
             Err(table.missing("full_step_m", &table.asks_for("full_step_m")))

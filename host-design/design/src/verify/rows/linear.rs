@@ -75,12 +75,17 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         name: "least resonance",
         meaning: "frequency to which the resonance of a step motor with the cart may fall before the loop, which does not know \
                   of it, is unstable; damping ratio 0.1",
-        values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.resonance_hz)))),
+        values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.resonance_hz?)))),
     },
     TrustQuantity {
         name: "least bandwidth",
         meaning: "the same for the bandwidth of a servo that follows its speed with a lag of first order",
         values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.bandwidth_hz)))),
+    },
+    TrustQuantity {
+        name: "largest bandwidth",
+        meaning: "how fast a servo may really be whose lag is made up for",
+        values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.largest_bandwidth_hz?)))),
     },
     TrustQuantity {
         name: "f32 gains",

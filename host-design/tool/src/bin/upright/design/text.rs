@@ -56,13 +56,9 @@ fn write_design(
             assessment.exact, assessment.rounded, assessment.continuous_at_tick, assessment.largest_rounding
         )?;
         if law == Law::Lqr
-            && let Some(DriveLimits { resonance_hz, bandwidth_hz }) = DriveLimits::of(rig, &certified.double)
+            && let Some(limits) = DriveLimits::of(rig, &certified.double)
         {
-            writeln!(
-                out,
-                "  the drive has to follow: resonance at least {resonance_hz:.1} Hz, or a servo with a bandwidth of at \
-                 least {bandwidth_hz:.1} Hz"
-            )?;
+            writeln!(out, "  the drive has to follow: {limits}")?;
         }
         match &report.run {
             Some(run) => writeln!(out, "  closed loop, firmware against {plant}: {run}")?,
@@ -143,14 +139,22 @@ pub(super) fn warnings(
         warnings
             .push("no force limit: give actuator.force_limit_n or a motor before connecting one".to_owned());
     }
+    let limits = DriveLimits::of(rig, &certified.double);
     let motor = StepMotor::of(rig).zip(rig.chain()).and_then(|(motor, chain)| motor.resonance_hz(chain));
-    if let (Some(found_hz), Some(limits)) = (motor, DriveLimits::of(rig, &certified.double))
-        && found_hz < limits.resonance_hz
+    let least_hz = limits.and_then(|limits| limits.resonance_hz);
+    if let Some((found_hz, least_hz)) = motor.zip(least_hz).filter(|(found_hz, least_hz)| found_hz < least_hz)
     {
         warnings.push(format!(
-            "the motor of [reality] resonates with the cart at {found_hz:.0} Hz, below the {:.0} Hz that the loop needs: take \
-             a stronger motor, a lighter cart or less acceleration",
-            limits.resonance_hz
+            "the motor of [reality] resonates with the cart at {found_hz:.0} Hz, below the {least_hz:.0} Hz that the loop \
+             needs: take a stronger motor, a lighter cart or less acceleration"
+        ));
+    }
+    if let (Some(found_hz), Some(limits)) = (rig.reality.step_motor.bandwidth_hz, limits)
+        && !limits.bandwidths_hz().contains(&found_hz)
+    {
+        warnings.push(format!(
+            "the servo of [reality] has a bandwidth of {found_hz} Hz; the loop needs {limits}: give the servo's real \
+             bandwidth in [actuator] (bandwidth_hz)"
         ));
     }
     if reports.is_empty() {
