@@ -56,8 +56,8 @@ pub struct DrawnMachine {
 
 impl DrawnMachine {
     /// Draws machine `number` of those that differ from `file` by up to `off_percent` in masses, lengths and inertias.
-    /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's. The true
-    /// dry friction is that at high speed.
+    /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's. The
+    /// true dry friction is that at high speed.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders.

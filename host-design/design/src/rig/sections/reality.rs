@@ -137,8 +137,8 @@ pub enum FrictionLaw {
     /// Journal 14(12), 1976). With an excess at rest it is the LuGre model (C. Canudas de Wit, H. Olsson, K. J. Åström,
     /// P. Lischinsky, IEEE Trans. Automatic Control 40(3), 1995).
     Dahl,
-    /// The Coulomb friction times the tanh of the speed, as a multiple of the key for the excess at rest: a contact that
-    /// never sticks.
+    /// The Coulomb friction times the tanh of the speed, which is divided by that at which half of an excess at rest
+    /// would be left: a contact that never sticks.
     Creeping,
 }
 
