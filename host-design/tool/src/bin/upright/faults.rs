@@ -84,8 +84,6 @@ impl FaultsCommand {
         let (rig, _, table) = self.variation.designed()?;
         if self.shake {
             rig.refuse_acceleration("faults --shake")?;
-        } else if self.target != TargetOption::Host {
-            rig.refuse_acceleration("faults --target")?;
         }
         let table = if self.swing_up {
             with_stored_motions(&self.variation.rig, &rig, table, Wanted::SwingUp)?
