@@ -7,6 +7,8 @@ use super::record::Record;
 
 /// Factors on the smoothing of the dry friction, one for each refit.
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
+/// Factor on the speed of a cart that never sticks: its friction shows it better than the length of a bristle.
+const CREEPING: f64 = 1.1;
 /// Factor on the excess of the friction at rest, if there is one.
 const OTHER_EXCESS: f64 = 0.5;
 /// Iterations of each refit.
@@ -53,6 +55,7 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
     for factor in SMOOTHINGS {
         let mut model = filter.model.clone();
         model.smoothing = model.smoothing.map(|smoothing| factor * smoothing);
+        model.creeping = model.creeping.map(|speed| CREEPING.powf(factor.ln().signum()) * speed);
         let other = Filter { model: &model, ..*filter };
         widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
     }

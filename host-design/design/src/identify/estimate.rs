@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::at_rest;
 use super::channel::chain_of;
 use super::covariance::{changes, deviations};
+use super::creeping;
 use super::doubt::Doubt;
 use super::error::IdentifyError;
 use super::estimated::{Estimate, Identification};
@@ -212,6 +213,8 @@ impl Fitted<'_> {
         let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
         // Noise and smoothing were tuned for the parameters before this fit.
         let model = with_friction_laws(&filter, &p, &noise);
+        let creeping = creeping::found(&Filter { model: &model, ..filter }, &p, &noise);
+        let (model, p) = creeping.unwrap_or((model, p));
         found.doubts.extend(Doubt::of_excess(model.excess));
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);

@@ -30,6 +30,7 @@ mod channel;
 mod convert;
 mod covariance;
 mod coverage;
+mod creeping;
 #[cfg(test)]
 mod decay;
 mod doubt;

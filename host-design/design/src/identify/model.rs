@@ -35,6 +35,9 @@ pub(super) struct Model {
     pub(super) gravity: f64,
     /// δ of the cart (m) and ε of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
+    /// Speed (m/s) above which the dry friction of the cart is about constant, if it has no bristle: its friction is then
+    /// `c_0 tanh(ẋ/v)`.
+    pub(super) creeping: Option<f64>,
     /// Excess of the friction at rest of the cart and of the joints, as a share of the friction in motion; not of
     /// joints that have a bristle.
     pub(super) excess: [f64; 2],
@@ -101,9 +104,14 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Factor of the dry friction of the cart at the speed `v` (m/s), and its derivative.
-    fn cart_factor(&self, v: f64) -> [f64; 2] {
-        stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v)
+    /// Dry friction of the cart at the speed `v` (m/s) with the deflection `bristle`, as a share of that in motion, and
+    /// its derivatives by speed and deflection.
+    fn cart_friction(&self, v: f64, bristle: f64) -> [f64; 3] {
+        let [factor, by_speed] = stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v);
+        let Some(creeping) = self.creeping else { return [factor * bristle, by_speed * bristle, factor] };
+        let direction = libm::tanh(v / creeping);
+        let slope = (1.0 - direction * direction) / creeping;
+        [factor * direction, by_speed * direction + factor * slope, 0.0]
     }
 
     /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
@@ -150,7 +158,7 @@ impl Accelerations {
         self.factors[0] = total;
         right[0] = input.force
             - (p[layout.viscous(0)] + input.back_emf) * v
-            - p[layout.dry(0)] * model.cart_factor(v)[0] * bristle
+            - p[layout.dry(0)] * model.cart_friction(v, bristle)[0]
             - model.gravity * total * slope_sine;
         let mut below = 0.0;
         for j in 0..n {
@@ -201,9 +209,9 @@ impl Accelerations {
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
-        let [factor, by_speed] = model.cart_factor(at[m]);
-        by[m] -= input.back_emf + p[layout.viscous(0)] + p[layout.dry(0)] * by_speed * at[2 * m];
-        by[2 * m] -= p[layout.dry(0)] * factor;
+        let [_, by_speed, by_bristle] = model.cart_friction(at[m], at[2 * m]);
+        by[m] -= input.back_emf + p[layout.viscous(0)] + p[layout.dry(0)] * by_speed;
+        by[2 * m] -= p[layout.dry(0)] * by_bristle;
         let mut below = 0.0;
         for j in 0..n {
             let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
@@ -247,7 +255,7 @@ impl Accelerations {
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
         by[s + Layout::TOTAL_MASS] -= xdd + gravity * slope_sine;
         by[s + layout.viscous(0)] -= v;
-        by[s + layout.dry(0)] -= model.cart_factor(v)[0] * at[2 * m];
+        by[s + layout.dry(0)] -= model.cart_friction(v, at[2 * m])[0];
         by[s + layout.tilt()] -= gravity * p[Layout::TOTAL_MASS] * slope_cosine;
         by[s + layout.delay()] += input.by_delay;
         by[s + layout.dead_zone()] += input.by_dead_zone;
@@ -357,6 +365,7 @@ pub(super) mod tests {
             layout: Layout { links: 3 },
             gravity: chain.gravity_m_per_s2,
             smoothing: SMOOTHING,
+            creeping: None,
             excess: [0.3, 0.2],
             is_clamped: false,
             has_bristles: false,

@@ -316,6 +316,7 @@ impl Record {
             layout: Layout { links: self.channels - 1 },
             gravity,
             smoothing: super::parameters::SMOOTHING,
+            creeping: None,
             excess: [0.0; 2],
             is_clamped: self.is_clamped,
             has_bristles: false,

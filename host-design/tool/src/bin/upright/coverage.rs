@@ -101,9 +101,10 @@ impl IdentifiedMachinesCommand {
             seed: self.seed,
             trust_wiring: self.trust_wiring,
         };
+        let friction = self.friction.to_possible_value().map(|value| value.get_name().to_owned());
         let options = json!({
             "runs": self.runs, "off": self.off, "seconds": self.seconds, "seed": self.seed,
-            "trust_wiring": self.trust_wiring, "friction": self.friction.to_possible_value().map(|value| value.get_name().to_owned()),
+            "trust_wiring": self.trust_wiring, "friction": friction,
         });
         let work = |study: &Study| -> Result<Coverage, Failure> {
             Ok(with_bar("machines", drawn.runs, |done| coverage(&rig, &drawn, study, done))?)
