@@ -16,6 +16,7 @@
 //! 2. Multiple shooting: in windows of 0.25 s, each with its own initial state, parameters and initial states are
 //!    fitted by the Levenberg–Marquardt method. The dry friction of the cart is a bristle (Dahl's model), so that the
 //!    cart sticks for a moment when it reverses; that of the joints is `c tanh(ω/ε)`.
+//!    A cart that never sticks has a tanh, too, if the log shows it.
 //! 3. Prediction error: an extended Kalman filter predicts each measurement from the earlier ones. Its noise
 //!    intensities and the smoothing of the friction are chosen by maximum likelihood; the parameters minimise the
 //!    squared innovations divided by their variances (Gauss–Newton).

@@ -35,7 +35,7 @@ pub(super) struct Model {
     pub(super) gravity: f64,
     /// δ of the cart (m) and ε of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
-    /// Speed (m/s) above which the dry friction of the cart is about constant, if it has no bristle: its friction is then
+    /// Speed v (m/s) above which the dry friction of the cart is about constant, if it has no bristle: it is then
     /// `c_0 tanh(ẋ/v)`.
     pub(super) creeping: Option<f64>,
     /// Excess of the friction at rest of the cart and of the joints, as a share of the friction in motion; not of
