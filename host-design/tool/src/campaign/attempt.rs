@@ -181,8 +181,13 @@ impl DefectRun<'_> {
                 injection.serial(&mut harness.session);
                 is_visible |= trial.kind == Defect::TableBit;
             }
-            let (is_on, stops) = (self.is_on(&harness.session, &output), self.stops(&harness.session));
-            observed.output(tick, output, is_on, stops);
+            let is_on = self.is_on(&harness.session, &output);
+            // A board has telemetry of some ticks only.
+            let stopped_before = match harness.session.ticks_since_fault() {
+                _ if !self.stops(&harness.session) => 0,
+                since => since.unwrap_or(1),
+            };
+            observed.output(tick, output, is_on, stopped_before);
             if observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
                 observed.fault = harness.session.fault();
             }

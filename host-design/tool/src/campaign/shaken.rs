@@ -72,7 +72,7 @@ impl DefectRun<'_> {
                 }
                 output => output?,
             };
-            observed.output(tick, output, output.enable, false);
+            observed.output(tick, output, output.enable, 0);
             observed.outside |= observed.off.is_none() && self.is_out_of_bounds(shaken.harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = shaken.harness.session.fault();
