@@ -148,8 +148,8 @@ impl<'a> Session<'a> {
         self.fault
     }
 
-    /// Number of ticks since the latched fault, according to the last telemetry; `None` without one, and if the firmware
-    /// has restarted since.
+    /// Number of ticks since the latched fault, according to the last telemetry; `None` without one, and if the
+    /// firmware has restarted since.
     pub fn ticks_since_fault(&self) -> Option<usize> {
         let since = self.ticks.wrapping_sub(1).wrapping_sub(self.cause_tick);
         // No telemetry is on its way for longer.
