@@ -234,7 +234,7 @@ fn coarse(record: &Record, rms: &[f64]) -> Vec<Doubt> {
         let times = rms[channel] / allowed;
         (times > COARSE).then(|| Doubt::Residual { channel: channel_name(channel), allowed, times })
     };
-    (usize::from(record.is_clamped)..record.channels).filter_map(one).collect()
+    (record.first_channel()..record.channels).filter_map(one).collect()
 }
 
 /// Standard deviation of an estimate, from its values without one part of the data each (B. Efron, C. Stein, "The

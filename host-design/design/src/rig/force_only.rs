@@ -7,7 +7,7 @@ use super::description::Rig;
 #[error(
     "{rig}: `upright {command}` serves only drives that give a force; with kind = \"acceleration\" in [actuator] there \
      are `check`, `design`, `verify`, `robust`, `simulate`, `compare`, `report`, `twin`, `faults`, `false-alarms`, \
-     `export`, `firmware build --board pico` (docs/drives.md). To see what it would say, describe the machine by kind = \"force\" and a cart of 100 times the \
+     `shake`, `identify`, `coverage`, `commission`, `export`, `firmware build --board pico` (docs/drives.md). To see what it would say, describe the machine by kind = \"force\" and a cart of 100 times the \
      links' mass, which moves as its drive says whatever the links do"
 )]
 pub struct ForceOnly {
