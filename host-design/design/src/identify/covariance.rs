@@ -19,9 +19,9 @@ struct Widening {
     least: f64,
 }
 
-/// Factor on both, if the drive imposes the cart's motion. Tuned with `upright coverage` on the machines of seed 1 of
-/// single-stepper and double-stepper.
-const IF_MOVED: f64 = 1.5;
+/// Factor on both, if the drive imposes the cart's motion. Tuned with `upright coverage` on 40 machines each of
+/// single-stepper (seed 1) and double-stepper (seeds 1 and 3).
+const IF_MOVED: f64 = 1.8;
 
 /// Tuned with `upright coverage` on the machines of seeds 1 and 2, so that 95 % of the intervals cover the truth.
 fn widening(kind: ParameterKind) -> Widening {

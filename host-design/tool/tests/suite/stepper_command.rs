@@ -54,6 +54,13 @@ fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
 }
 
 #[test]
+fn defects_while_a_stepper_shakes_its_links_are_not_missed() {
+    let output = upright(&["faults", &stepper(), "--shake", "--runs", "56"]);
+    assert_eq!(status(&output), 0, "{}{}", stdout(&output), stderr(&output));
+    assert!(stdout(&output).contains("24 of 24 runs miss the defect, as they must"), "{}", stdout(&output));
+}
+
+#[test]
 fn compared_steppers_have_a_largest_acceleration_and_mixed_drives_are_told_apart() {
     let (single, motor) = (stepper(), rig_path("single-quanser-ip02").display().to_string());
     let compared = |rigs: &[&str]| {
