@@ -20,7 +20,8 @@ const ONLY: [u8; 2] = 1u16.to_le_bytes();
 
 impl Log {
     /// Writes every tick as CSV: its number and time, each channel's deviation from hanging in counts and in its unit,
-    /// the drive as duty, force or pulses, supply and contacts. `steps` holds the travel per count of each channel (m or rad).
+    /// the drive as duty, force or pulses, supply and contacts. `steps` holds the travel per count of each channel (m,
+    /// rad).
     ///
     /// # Errors
     /// Those of writing to `out`.

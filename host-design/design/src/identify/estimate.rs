@@ -19,6 +19,7 @@ use super::realise::realise;
 use super::record::Record;
 use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
+use super::travel;
 use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
 use super::window_errors::{WindowErrors, window_errors};
 use super::wiring;
@@ -223,7 +224,7 @@ impl Fitted<'_> {
         let inverse = normal.factor(0.0).ok_or_else(undetermined)?.inverse();
         let changes = changes(&filter, self.finer, &p, &noise);
         if self.used.is_moved {
-            found.doubts.extend(imposed::doubted_travel(&filter, &p, &noise));
+            found.doubts.extend(travel::doubted_travel(&filter, &p, &noise));
         }
         let kinds = model.layout.kinds();
         let deviations = deviations(&kinds, self.priors, &inverse, &changes, &p, self.used);

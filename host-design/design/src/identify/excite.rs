@@ -9,10 +9,10 @@ use upright::supervision::shaking::SPEED_SHARE;
 use upright::supervision::slow_drive::SlowDrive;
 use upright::table::{Equilibrium, Law, StepMap};
 
+use super::cart_force::CartForce;
 use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log, LogHeader, Tick};
-use super::model::CartForce;
 use super::model::Model;
 use super::parameters::{Layout, priors};
 use super::record::Record;
@@ -28,8 +28,8 @@ use crate::table::{NoTable, step_map};
 const LINES: [usize; 2] = [16, 24];
 /// Limits of its frequency band, as multiples of the lowest and of the highest hanging mode.
 const BAND: [f64; 2] = [0.25, 1.6];
-/// The lower limit, if the drive imposes the cart's motion: with accelerations of equal size, slow lines need most of the
-/// rail, and no friction of the cart has to be seen in them.
+/// The lower limit, if the drive imposes the cart's motion: with accelerations of equal size, slow lines need most of
+/// the rail, and no friction of the cart has to be seen in them.
 const LOWEST_MOVED: f64 = 0.7;
 /// Intended motion: largest angle of a link from hanging (rad), and share of the rail.
 pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);

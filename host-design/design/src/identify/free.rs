@@ -250,7 +250,7 @@ fn jackknife(without: &[f64]) -> f64 {
 mod tests {
     use std::path::Path;
 
-    use super::super::model::CartForce;
+    use super::super::cart_force::CartForce;
     use super::super::parameters::priors;
     use super::super::step::Step;
     use super::super::table::RecordingRows;

@@ -1,15 +1,15 @@
 //! A cart whose motion is imposed: its drive goes where its pulses say, so that its path is the input of the model.
 //!
 //! Pulses are even within a tick: the cart has a constant speed there, which jumps from tick to tick. A jump within a
-//! step of the integration is replaced by jumps at both ends of the step and a constant acceleration between, which
-//! have the same moments of order 0 to 2: for a jump at the share s of the step
+//! step of the integration is replaced by jumps at both ends of the step and a constant acceleration between, with
+//! the same moments of order 0 to 2: for a jump at the share s of the step
 //!
 //! ```text
 //! α + β + γ = 1,   β/2 + γ = s,   β/3 + γ = s²
 //! ```
 //!
-//! with the parts α and γ at the beginning and the end, and β between. A jump at the beginning of a step stays as it is,
-//! and the path is exact at every end.
+//! with the parts α and γ at the beginning and the end, and β between. A jump at the beginning of a step stays as it
+//! is, and the path is exact at every end.
 //!
 //! The links do not feel the cart's mass and friction, and a common factor of their masses and frictions changes no
 //! motion. So cart and first moment of the last link are those of the file.
@@ -18,21 +18,13 @@ use std::path::Path;
 
 use upright::protocol::tick_log::OFF;
 
-use super::doubt::Doubt;
+use super::cart_force::CartForce;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
-use super::model::CartForce;
 use super::parameters::{Layout, Prior};
-use super::prediction::Filter;
 
 /// Share of the pulses that counts may miss: a board may count those of a tick a little later.
 const MISCOUNTED: f64 = 0.25;
-/// Prior deviation of the travel per step, when it is doubted.
-const TRAVEL: f64 = 0.05;
-/// Iterations of the fit with it.
-const ITERATIONS: usize = 3;
-/// Least error of the travel per step that is named: a share, and in its deviations.
-const WRONG_TRAVEL: (f64, f64) = (2e-3, 5.0);
 
 /// Inputs of the steps of `stride` ticks, each `step_s` long, on the path with these positions at the ticks (m) times
 /// `travel`.
@@ -105,18 +97,6 @@ pub(super) fn known(layout: Layout, priors: &mut [Prior]) {
     cart.into_iter().chain(others).for_each(|index| priors[index].deviation = 0.0);
     // The pulses of a tick begin in that tick.
     priors[layout.delay()] = Prior { value: 0.0, deviation: 0.0 };
-}
-
-/// Whether the travel per step is another than that of the file: the fit `p` goes on with it.
-pub(super) fn doubted_travel(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Option<Doubt> {
-    let travel = filter.model.layout.travel();
-    let mut priors = filter.priors.to_vec();
-    priors[travel].deviation = TRAVEL;
-    let (p, normal) = Filter { priors: &priors, ..*filter }.fit(p, noise, ITERATIONS)?;
-    let deviation = TRAVEL * normal.factor(0.0)?.inverse()[travel * (p.len() + 1)].sqrt();
-    let error = (p[travel] - 1.0).abs();
-    (error > WRONG_TRAVEL.0 && error > WRONG_TRAVEL.1 * deviation)
-        .then_some(Doubt::Travel { share: p[travel], deviation })
 }
 
 #[cfg(test)]

@@ -68,7 +68,8 @@ pub struct LogHeader {
 pub struct Tick {
     /// Number of the tick.
     pub number: u32,
-    /// Applied duty or force, 32767 at full scale, or the pulses of the tick; [`OFF`] while the motor is off and turns freely.
+    /// Applied duty or force, 32767 at full scale, or the pulses of the tick; [`OFF`] while the motor is off and turns
+    /// freely.
     pub drive: i16,
     /// Supply (mV); 0 if it is not measured.
     pub supply_mv: u16,

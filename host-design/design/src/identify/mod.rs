@@ -26,6 +26,7 @@
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
 mod at_rest;
+mod cart_force;
 mod channel;
 mod convert;
 mod covariance;
@@ -58,6 +59,7 @@ mod shooting;
 mod step;
 mod stribeck;
 mod table;
+mod travel;
 mod verdict;
 mod window_errors;
 mod wiring;

@@ -3,6 +3,7 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
+use super::cart_force::CartForce;
 use super::parameters::Layout;
 use super::rows::add_multiple;
 use super::stribeck;
@@ -26,8 +27,8 @@ use super::stribeck;
 /// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. If the friction at rest is larger than in
 /// motion, c_0 and c_i have a factor ([`stribeck::factor`]). Here
 /// e is the damping by the motor's back-EMF, and q_j the air drag of link j. If the motion of the cart is imposed,
-/// ẍ is given instead of the first equation; it is 0 for a cart that is clamped. A cart that reverses is held by its friction until the bristle has
-/// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
+/// ẍ is given instead of the first equation; it is 0 for a cart that is clamped. A cart that reverses is held by its
+/// friction until the bristle has reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
 /// friction model without memory it would creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
@@ -44,21 +45,6 @@ pub(super) struct Model {
     pub(super) substeps: usize,
     /// Whether the friction of each joint has a bristle, as that of the cart has.
     pub(super) has_bristles: bool,
-}
-
-/// Force on the cart in a step (N), and its derivatives; or the motion that is imposed on it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct CartForce {
-    /// Force (N), or an imposed acceleration (m/s²).
-    pub(super) force: f64,
-    /// Imposed jump of the cart's speed at the beginning of the step (m/s).
-    pub(super) jump: f64,
-    /// Derivative by the delay (N/tick).
-    pub(super) by_delay: f64,
-    /// Derivative by the dead zone (N/V).
-    pub(super) by_dead_zone: f64,
-    /// e: back-EMF as damping (N·s/m); 0 while the motor turns freely.
-    pub(super) back_emf: f64,
 }
 
 /// Accelerations at one state, and their derivatives.

@@ -120,25 +120,30 @@ fn with_masses(
         outer += mass_kg;
     }
     links.reverse();
-    let cart = RealisedCart {
-        mass_kg: scale * p[Layout::TOTAL_MASS] - outer,
-        viscous: (scale * p[layout.viscous(0)]).max(0.0),
-        dry_n: (scale * p[layout.dry(0)]).max(0.0),
-    };
-    let cart = (chain.input == CartInput::Force).then_some(cart);
-    if cart.is_some_and(|cart| cart.mass_kg <= 0.0) {
-        return Err(IdentifyError::Physical(
-            "the cart would have no mass: the links of the file are too heavy, or the force is smaller than the file says"
-                .to_owned(),
-        ));
-    }
     Ok(Realised {
-        cart,
+        cart: cart(chain, p, scale, outer)?,
         links,
         tilt_rad: p[layout.tilt()],
         dead_zone_v: p[layout.dead_zone()].max(0.0),
         resistance_factor: 1.0 / scale,
     })
+}
+
+/// The cart under links of `links_kg`; none if its drive imposes its motion.
+fn cart(chain: &Chain, p: &[f64], scale: f64, links_kg: f64) -> Result<Option<RealisedCart>, IdentifyError> {
+    if chain.input == CartInput::Acceleration {
+        return Ok(None);
+    }
+    let layout = Layout { links: chain.links.len() };
+    let mass_kg = scale * p[Layout::TOTAL_MASS] - links_kg;
+    if mass_kg <= 0.0 {
+        return Err(IdentifyError::Physical(
+            "the cart would have no mass: the links of the file are too heavy, or the force is smaller than the file says"
+                .to_owned(),
+        ));
+    }
+    let [viscous, dry_n] = [layout.viscous(0), layout.dry(0)].map(|index| (scale * p[index]).max(0.0));
+    Ok(Some(RealisedCart { mass_kg, viscous, dry_n }))
 }
 
 #[cfg(test)]

@@ -7,11 +7,12 @@ use core::f64::consts::PI;
 
 use upright::protocol::tick_log::OFF;
 
+use super::cart_force::CartForce;
 use super::channel::channel_name;
 use super::error::IdentifyError;
 use super::imposed;
 use super::log::{DriveScale, Log};
-use super::model::{CartForce, Model};
+use super::model::Model;
 use super::parameters::Layout;
 use super::table::RecordingRows;
 use crate::rig::{Motor, Rig};

@@ -2,7 +2,8 @@
 
 use core::f64::consts::PI;
 
-use super::model::{Accelerations, CartForce, Model};
+use super::cart_force::CartForce;
+use super::model::{Accelerations, Model};
 use super::rows::{add_multiple, set_multiple};
 
 /// A step of the classical Runge–Kutta method, with derivatives by the state at its start and by the parameters.
