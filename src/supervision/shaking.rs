@@ -62,8 +62,8 @@ pub struct Shaking {
 }
 
 impl Shaking {
-    /// Whether the largest force is positive and at most `force_limit_n` (N, or m/s²), and both constants are finite and
-    /// not negative.
+    /// Whether the largest force is positive and at most `force_limit_n` (N, or m/s²), and both constants are finite
+    /// and not negative.
     pub fn is_sound(&self, force_limit_n: f32) -> bool {
         let constants = [self.stiffness_n_per_m, self.damping_n_s_per_m];
         self.most_n > 0.0

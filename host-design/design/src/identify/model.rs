@@ -28,8 +28,8 @@ use super::stribeck;
 /// motion, c_0 and c_i have a factor ([`stribeck::factor`]). Here
 /// e is the damping by the motor's back-EMF, and q_j the air drag of link j. If the motion of the cart is imposed,
 /// ẍ is given instead of the first equation; it is 0 for a cart that is clamped. A cart that reverses is held by its
-/// friction until the bristle has reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
-/// friction model without memory it would creep instead.
+/// friction until the bristle has reversed, too (P. R. Dahl, "Solid friction damping of mechanical
+/// vibrations", AIAA Journal 14(12), 1976); with a friction model without memory it would creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) layout: Layout,
