@@ -9,7 +9,7 @@ use super::error::IdentifyError;
 use super::estimate::{Settings, identify};
 use super::estimated::Identification;
 use super::excite::shake_machine;
-use super::machines::DrawnMachine;
+use super::machines::{DrawnMachine, TrueFriction};
 use super::parameters::ParameterKind;
 use crate::rig::Rig;
 use crate::study::{Study, StudyError};
@@ -159,6 +159,8 @@ pub struct Drawn {
     pub off_percent: f64,
     /// Duration of each log (s).
     pub seconds: f64,
+    /// Law of the machines' dry friction.
+    pub friction: TrueFriction,
     /// Seed of the machines.
     pub seed: u64,
     /// Whether to skip the check of the wiring; it is always that of the file.
@@ -213,7 +215,7 @@ pub fn coverage(
 /// # Errors
 /// [`IdentifyError`] if the rig has no chain with encoders; later failures are in [`Identified::refused`].
 pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, CoverageError> {
-    let machine = DrawnMachine::draw(file, drawn.off_percent, drawn.seed, number)?;
+    let machine = DrawnMachine::draw(file, drawn.off_percent, drawn.friction, drawn.seed, number)?;
     let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };
     let found = shake_machine(file, &machine.rig, drawn.seconds, number)
         .and_then(|log| identify(file, &[(PathBuf::from("log"), log)], &settings, &|_| ()));

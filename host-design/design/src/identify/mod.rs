@@ -75,7 +75,7 @@ pub use estimated::{Estimate, Identification};
 pub use excite::{Excitation, shake};
 pub use feed::Feed;
 pub use log::{CONTACTS, DriveScale, Log, LogHeader, Tick};
-pub use machines::DrawnMachine;
+pub use machines::{DrawnMachine, TrueFriction};
 pub use over_line::{LineError, OverLine};
 pub use parameters::ParameterKind;
 pub use realise::{Realised, RealisedCart, RealisedLink};

@@ -53,7 +53,7 @@ pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
 pub use sections::reality::{
-    DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors, StepMotorData,
+    DriveTrain, DriverFaults, DryFriction, FrictionLaw, ParameterErrors, Reality, SensorErrors, StepMotorData,
 };
 pub use sections::robust::Tolerances;
 pub use sections::swing_up::SwingUpRules;
