@@ -9,7 +9,8 @@ use std::vec::Vec;
 use super::message::*;
 use super::tick_log::{LoggedTick, OFF, TickLog};
 use super::*;
-use crate::board::Contacts;
+use crate::board::{Contacts, Output};
+use crate::control::actuator::Drive;
 use crate::control::controller::Rejected;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
@@ -115,8 +116,8 @@ fn lines() -> String {
         contacts: 5,
         supply_mv: 12_500,
         ticks: [
-            LoggedTick::new(&[-1, 2048], Some(-0.5)),
-            LoggedTick { drive: OFF.to_le_bytes(), ..LoggedTick::new(&[0, 0], None) },
+            LoggedTick::new(&[-1, 2048], &Output::on(Drive::Duty(-0.5), 1.0)),
+            LoggedTick { drive: OFF.to_le_bytes(), ..LoggedTick::new(&[0, 0], &Output::OFF) },
         ]
         .into_iter()
         .collect(),

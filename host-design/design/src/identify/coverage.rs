@@ -85,6 +85,7 @@ impl CoveredQuantity {
             ParameterKind::Zero(_) => Self::Zero,
             ParameterKind::AirDrag(_)
             | ParameterKind::Presliding(_)
+            | ParameterKind::Travel
             | ParameterKind::EccentricSine(_)
             | ParameterKind::EccentricCosine(_) => return None,
         })
@@ -243,11 +244,13 @@ fn missed(machine: &DrawnMachine, found: &Identification) -> Vec<Missed> {
     // The shape is what does not depend on the scale of the force.
     let ratio = |kind: ParameterKind| Some(found.estimate(kind)?.new / machine.truth(kind)?);
     let moments = found.estimates.iter().filter_map(|estimate| match estimate.kind {
-        ParameterKind::FirstMoment(link) => Some(link),
+        ParameterKind::SecondMoment(link) => Some(link),
         _ => None,
     });
     let Some(last) = moments.max() else { return all };
-    let Some(scale) = ratio(ParameterKind::FirstMoment(last)) else { return all };
+    // If the drive imposes the cart's motion, the true values are ratios, too.
+    let of_force = ratio(ParameterKind::FirstMoment(last)).filter(|_| !found.is_moved);
+    let Some(scale) = of_force.or(found.is_moved.then_some(1.0)) else { return all };
     let error = |quantity: CoveredQuantity, error: f64| Missed { quantity, error, deviation: None };
     for link in 0..=last {
         let [first, second] =
@@ -260,6 +263,6 @@ fn missed(machine: &DrawnMachine, found: &Identification) -> Vec<Missed> {
                 .map(|ratio| error(CoveredQuantity::Shape, ratio - 1.0)),
         );
     }
-    all.push(error(CoveredQuantity::Scale, scale - 1.0));
+    all.extend(of_force.map(|scale| error(CoveredQuantity::Scale, scale - 1.0)));
     all
 }

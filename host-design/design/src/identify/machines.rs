@@ -105,7 +105,15 @@ impl DrawnMachine {
         rig.reality.driver.latency_s = 0.5 * (LATENCY_TICKS + within(LATENCY_TICKS)) * rig.tick.period_s;
         let mut random_in = |low: f64, high: f64| random.random_range(low..=high);
         draw_law(&mut rig, law, &mut random_in);
-        let truth = truth(&rig)?;
+        let mut truth = truth(&rig)?;
+        if file.actuator.acceleration.is_some() {
+            // Pulses begin in their tick, and are felt by the links alone, as ratios to the last first moment.
+            rig.reality.driver = file.reality.driver.clone();
+            let of_file = priors[layout.first_moment(links - 1)].value;
+            let of_machine = truth.iter().find(|(kind, _)| *kind == ParameterKind::FirstMoment(links - 1));
+            let ratio = of_machine.map_or(1.0, |(_, moment)| of_file / moment);
+            truth.iter_mut().filter(|(kind, _)| kind.is_of_masses()).for_each(|(_, value)| *value *= ratio);
+        }
         Ok(Self { rig, truth })
     }
 
@@ -164,6 +172,7 @@ fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
         ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
         ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j)),
         ParameterKind::Presliding(_)
+        | ParameterKind::Travel
         | ParameterKind::EccentricSine(_)
         | ParameterKind::EccentricCosine(_) => None,
     };

@@ -27,6 +27,7 @@
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
 mod at_rest;
+mod cart_force;
 mod channel;
 mod convert;
 mod covariance;
@@ -41,6 +42,7 @@ mod estimated;
 mod excite;
 mod feed;
 mod free;
+mod imposed;
 mod log;
 mod machines;
 mod model;
@@ -59,6 +61,7 @@ mod shooting;
 mod step;
 mod stribeck;
 mod table;
+mod travel;
 mod verdict;
 mod window_errors;
 mod wiring;
@@ -77,7 +80,7 @@ pub use log::{CONTACTS, DriveScale, Log, LogHeader, Tick};
 pub use machines::{DrawnMachine, TrueFriction};
 pub use over_line::{LineError, OverLine};
 pub use parameters::ParameterKind;
-pub use realise::{Realised, RealisedLink};
+pub use realise::{Realised, RealisedCart, RealisedLink};
 pub use recorder::Recorder;
 pub use recordings::Recordings;
 pub use table::{AngleReference, AngleZero, Reading, RecordingError, RecordingTable};

@@ -3,6 +3,7 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
+use super::cart_force::CartForce;
 use super::parameters::Layout;
 use super::rows::add_multiple;
 use super::stribeck;
@@ -25,10 +26,10 @@ use super::stribeck;
 ///
 /// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. If the friction at rest is larger than in
 /// motion, c_0 and c_i have a factor ([`stribeck::factor`]). Here
-/// e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
-/// instead of the first equation. A cart that reverses is held by its friction until the bristle has
-/// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
-/// friction model without memory it would creep instead.
+/// e is the damping by the motor's back-EMF, and q_j the air drag of link j. If the motion of the cart is imposed,
+/// ẍ is given instead of the first equation; it is 0 for a cart that is clamped. A cart that reverses is held by its
+/// friction until the bristle has reversed, too (P. R. Dahl, "Solid friction damping of mechanical
+/// vibrations", AIAA Journal 14(12), 1976); with a friction model without memory it would creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) layout: Layout,
@@ -41,22 +42,12 @@ pub(super) struct Model {
     /// Excess of the friction at rest of the cart and of the joints, as a share of the friction in motion; not of
     /// joints that have a bristle.
     pub(super) excess: [f64; 2],
-    /// Whether the cart cannot move.
-    pub(super) is_clamped: bool,
+    /// Whether the cart's motion is imposed, by a drive or by a clamp.
+    pub(super) is_imposed: bool,
+    /// Parts of an integration step.
+    pub(super) substeps: usize,
     /// Whether the friction of each joint has a bristle, as that of the cart has.
     pub(super) has_bristles: bool,
-}
-
-/// Force on the cart in a step (N), and its derivatives.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct CartForce {
-    pub(super) force: f64,
-    /// Derivative by the delay (N/tick).
-    pub(super) by_delay: f64,
-    /// Derivative by the dead zone (N/V).
-    pub(super) by_dead_zone: f64,
-    /// e: back-EMF as damping (N·s/m); 0 while the motor turns freely.
-    pub(super) back_emf: f64,
 }
 
 /// Accelerations at one state, and their derivatives.
@@ -180,9 +171,11 @@ impl Accelerations {
                 right[j] += friction;
             }
         }
-        if model.is_clamped {
-            (self.factors[0], right[0]) = (1.0, 0.0);
-            (1..m).for_each(|row| self.factors[row * m] = 0.0);
+        if model.is_imposed {
+            (self.factors[0], right[0]) = (1.0, input.force);
+            for row in 1..m {
+                right[row] -= core::mem::take(&mut self.factors[row * m]) * input.force;
+            }
         }
         factorise(&mut self.factors, m);
         solve(&self.factors, m, 1, &mut self.acceleration);
@@ -196,8 +189,11 @@ impl Accelerations {
         if self.columns > model.states() {
             self.by_parameters(model, p, at, input);
         }
-        if model.is_clamped {
+        if model.is_imposed {
             self.jacobian[..self.columns].fill(0.0);
+            if self.columns > model.states() {
+                self.by_travel(model, p, input);
+            }
         }
         solve(&self.factors, model.coordinates(), self.columns, &mut self.jacobian);
     }
@@ -293,6 +289,17 @@ impl Accelerations {
         }
     }
 
+    /// `-∂r` by the travel per step, to which an imposed acceleration is proportional.
+    fn by_travel(&mut self, model: &Model, p: &[f64], input: &CartForce) {
+        let (column, share) =
+            (model.states() + model.layout.travel(), input.force / p[model.layout.travel()]);
+        self.jacobian[column] = share;
+        for (link, cosine) in self.cosine.iter().enumerate().take(model.layout.links) {
+            self.jacobian[(link + 1) * self.columns + column] =
+                p[model.layout.first_moment(link)] * cosine * share;
+        }
+    }
+
     /// Accelerations of the coordinates per unit of force on the cart and of torque in each joint, at the state of the
     /// last call: m×m, row by row.
     pub(super) fn inputs(&self) -> Vec<f64> {
@@ -367,7 +374,8 @@ pub(super) mod tests {
             smoothing: SMOOTHING,
             creeping: None,
             excess: [0.3, 0.2],
-            is_clamped: false,
+            is_imposed: false,
+            substeps: 1,
             has_bristles: false,
         };
         let mut p: Vec<f64> = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
@@ -394,20 +402,21 @@ pub(super) mod tests {
 
     #[test]
     fn derivatives_agree_with_differences() {
-        derivatives_agree(false);
-        derivatives_agree(true);
+        derivatives_agree(false, false);
+        derivatives_agree(true, false);
+        derivatives_agree(false, true);
     }
 
-    fn derivatives_agree(has_bristles: bool) {
+    fn derivatives_agree(has_bristles: bool, is_imposed: bool) {
         let (mut model, mut p, _) = triple();
-        model.has_bristles = has_bristles;
+        (model.has_bristles, model.is_imposed) = (has_bristles, is_imposed);
         p[model.layout.tilt()] = 0.1;
         let mut exact = Accelerations::new(&model, true);
         exact.differentiate(
             &model,
             &p,
             &AT,
-            &CartForce { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
+            &CartForce { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7, jump: 0.0 },
         );
         let states = model.states();
         let columns = states + model.layout.of_motion();
@@ -422,6 +431,8 @@ pub(super) mod tests {
                 let step = if column < states { 1e-6 } else { 1e-6 * p[column - states].abs().max(1e-2) };
                 match column.checked_sub(states) {
                     None => state[column] += sign * step,
+                    Some(index) if is_imposed && index == model.layout.travel() => force *= 1.0 + sign * step,
+                    Some(index) if is_imposed && index >= model.layout.delay() => {}
                     Some(index) if index == model.layout.delay() => force += sign * step * 2.0,
                     Some(index) if index == model.layout.dead_zone() => force -= sign * step * 3.0,
                     Some(index) => p[index] += sign * step,

@@ -46,23 +46,6 @@ fn check_design_simulate_and_export_serve_a_stepper() {
 }
 
 #[test]
-fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
-    let rig = stepper();
-    let refused = |arguments: &[&str]| {
-        let output = upright(arguments);
-        assert_eq!(status(&output), 2, "{arguments:?}: {}", stderr(&output));
-        let words =
-            format!("single-stepper: `upright {}` serves only drives that give a force", arguments[0]);
-        assert!(stderr(&output).contains(&words), "{arguments:?}: {}", stderr(&output));
-    };
-    refused(&["commission", &rig, "--target", "host"]);
-    refused(&["identify", &rig, "nothing.log"]);
-    let output = upright(&["faults", &rig, "--shake"]);
-    assert_eq!(status(&output), 2, "{}", stderr(&output));
-    assert!(stderr(&output).contains("`upright faults --shake` serves only drives that give a force"));
-}
-
-#[test]
 fn commands_with_an_image_serve_a_stepper() {
     let (rig, table) = rig_and_table("single-stepper");
     if built_for(ImageKind::Board(BoardName::WeactF405), rig, table).is_none() {
@@ -90,6 +73,13 @@ fn commands_with_an_image_serve_a_stepper() {
         "{}",
         stderr(&refused)
     );
+}
+
+#[test]
+fn defects_while_a_stepper_shakes_its_links_are_not_missed() {
+    let output = upright(&["faults", &stepper(), "--shake", "--runs", "56"]);
+    assert_eq!(status(&output), 0, "{}{}", stdout(&output), stderr(&output));
+    assert!(stdout(&output).contains("24 of 24 runs miss the defect, as they must"), "{}", stdout(&output));
 }
 
 #[test]

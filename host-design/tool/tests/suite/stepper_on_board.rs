@@ -273,7 +273,13 @@ fn defects_of_a_stepper_are_found_on_the_board_as_on_the_host() {
     let Some(image) = image(rig, table) else { return };
     let place = RunPlace::Board { image: &image, conditions: BoardName::WeactF405.conditions(1) };
     let setup = Setup { rig, table, place, detection: true, guards: true, during: During::Balancing };
-    let chosen = [Defect::StopBetweenTicks, Defect::StalledTick, Defect::WriteLost, Defect::CartJammed];
+    let chosen = [
+        Defect::StopBetweenTicks,
+        Defect::StalledTick,
+        Defect::WriteLost,
+        Defect::CartJammed,
+        Defect::LimitSwitch,
+    ];
     assert!(chosen.iter().all(|kind| kinds(table, place).contains(kind)));
     let result =
         campaign(&setup, &chosen, 1, 2 * chosen.len() as u64, (&Study::whole(), ""), &|| ()).unwrap();

@@ -92,7 +92,6 @@ fn below_90(text: &str) -> Result<f64, String> {
 impl IdentifiedMachinesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("coverage")?;
         let drawn = Drawn {
             runs: u64::from(self.runs),
             off_percent: self.off,
