@@ -16,7 +16,7 @@ const LEAST_GAIN: f64 = 12.0;
 /// The model with the speed of the cart's `tanh` under which the measurements are most likely, and the parameters that
 /// were fitted with it; none if a bristle explains them as well.
 pub(super) fn found(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Option<(Model, Vec<f64>)> {
-    if filter.model.is_clamped {
+    if filter.model.is_imposed {
         return None;
     }
     let short = filter.record.part(0.0, TRIAL_S);
