@@ -68,7 +68,8 @@ pub struct Contacts {
     pub driver_fault: bool,
     /// The previous tick was still running when this one was due.
     pub overrun: bool,
-    /// The processor's clock did not start or has stopped: ticks have the wrong length.
+    /// The processor's clock did not start or has stopped: ticks have the wrong length, or one came before the
+    /// pulses of the one before had ended.
     pub clock_fault: bool,
     /// The chip is not the one that the image is for, a register lost what was written to it, or the chip's own supply
     /// was low.

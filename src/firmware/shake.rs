@@ -6,9 +6,9 @@ use crate::control::actuator::Drive;
 use crate::protocol::message::{Answer, InvalidRequest};
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
-use crate::supervision::shaking::{FORCES, Shaking};
+use crate::supervision::shaking::{FORCES, SPEED_SHARE, Shaking};
 use crate::supervision::supervisor::State;
-use crate::table::SwingUp;
+use crate::table::{StepMap, SwingUp};
 
 /// At the start, the cart has to be within this fraction of the rail's soft limits.
 const CENTRE: f32 = 0.25;
@@ -16,8 +16,9 @@ const CENTRE: f32 = 0.25;
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Begins to shake the rig. `id` is that of the command.
     pub(super) fn begin_shaking(&mut self, shaking: Shaking, id: u64) -> Answer {
-        // Forces mean nothing to a drive with pulses.
-        if self.table.steps.is_some() || !shaking.is_sound(self.table.force_limit_n) {
+        let most =
+            self.table.steps.map_or(self.table.force_limit_n, |steps| steps.acceleration_limit_m_per_s2);
+        if !shaking.is_sound(most) {
             return Answer::Rejected(InvalidRequest::Shaking);
         }
         let counts = *self.controller.encoders().counts();
@@ -70,8 +71,15 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
     }
 
-    /// The motor command for this force (N) on the moving cart, and the force that it produces (N).
+    /// The motor command for this force (N) on the moving cart, and the force that it produces (N); for a drive with
+    /// pulses, those of an acceleration (m/s²).
     fn actuate(&mut self, force_n: f32) -> (Drive, f32) {
+        if let Some(steps) = &self.table.steps {
+            let most = SPEED_SHARE * self.table.limits.speed_m_per_s;
+            let map = StepMap { speed_limit_m_per_s: steps.speed_limit_m_per_s.min(most), ..*steps };
+            let (applied, pulses) = self.slow_drive.accelerate(force_n, &map, self.table.tick_s);
+            return (Drive::Steps(pulses), applied);
+        }
         let Some(motor) = &self.table.motor else { return (Drive::Force(force_n), force_n) };
         let (volts, applied_n) = motor.volts_and_force(force_n, self.shaker.speed_m_per_s(), self.last_volts);
         self.last_volts = volts;

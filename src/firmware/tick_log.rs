@@ -18,8 +18,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             let next = TickLog::new(self.tick, &self.contacts, self.supply_v);
             complete = Some(core::mem::replace(log, next)).filter(|log| !log.ticks.is_empty());
         }
-        let duty = self.output.enable.then_some(self.output.duty);
-        log.push(LoggedTick::new(self.controller.encoders().counts(), duty));
+        log.push(LoggedTick::new(self.controller.encoders().counts(), &self.output));
         complete
     }
 }

@@ -29,10 +29,6 @@ const CYCLES_PER_TICK: u32 = {
     (gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5) as u32
 };
 
-/// The board has pins for the duty cycle of a motor driver, none for step pulses.
-const _: () =
-    assert!(gains::TABLE.steps.is_none(), "kind = \"acceleration\": this board makes no step pulses");
-
 #[rtic::app(device = crate::pac, peripherals = true)]
 mod app {
     use heapless::spsc::Queue;

@@ -35,10 +35,11 @@ const _: () = assert!(3.0 * KEEP_ALIVE.as_secs_f32() < HOST_SILENCE_S);
 /// capacity of the line, the longest telemetry three quarters.
 const TELEMETRY_S: f32 = 0.01;
 
-/// The initial period of telemetry in ticks of `tick_s` (s), at least one.
+/// The initial period of telemetry in ticks of `tick_s` (s), at least two: a board sends a message in a tick, and
+/// replies need a place.
 pub fn telemetry_ticks(tick_s: f32) -> u16 {
     // Rounded up, unless only the rounding of the division has made it more than a whole number.
-    ((TELEMETRY_S / tick_s + 0.999) as u16).max(1)
+    ((TELEMETRY_S / tick_s + 0.999) as u16).max(2)
 }
 
 pub mod frame;

@@ -9,7 +9,8 @@ use std::vec::Vec;
 use super::message::*;
 use super::tick_log::{LoggedTick, OFF, TickLog};
 use super::*;
-use crate::board::Contacts;
+use crate::board::{Contacts, Output};
+use crate::control::actuator::Drive;
 use crate::control::controller::Rejected;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
@@ -115,8 +116,8 @@ fn lines() -> String {
         contacts: 5,
         supply_mv: 12_500,
         ticks: [
-            LoggedTick::new(&[-1, 2048], Some(-0.5)),
-            LoggedTick { drive: OFF.to_le_bytes(), ..LoggedTick::new(&[0, 0], None) },
+            LoggedTick::new(&[-1, 2048], &Output::on(Drive::Duty(-0.5), 1.0)),
+            LoggedTick { drive: OFF.to_le_bytes(), ..LoggedTick::new(&[0, 0], &Output::OFF) },
         ]
         .into_iter()
         .collect(),
@@ -176,5 +177,5 @@ fn the_longest_telemetry_fits_on_the_line_at_every_tick() {
         let at_tenth = serial_link::MAX_MESSAGE as f32 / tick_s;
         assert_eq!(at_tenth > BAUD as f32, microseconds < 738);
     }
-    assert_eq!([0.000_5, 0.001, 0.002, 0.005, 0.02].map(telemetry_ticks), [20, 10, 5, 2, 1]);
+    assert_eq!([0.000_5, 0.001, 0.002, 0.005, 0.02].map(telemetry_ticks), [20, 10, 5, 2, 2]);
 }

@@ -3,7 +3,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::board::Contacts;
+use crate::board::{Contacts, Output};
+use crate::control::actuator::Drive;
 
 /// Largest number of ticks in a message.
 pub const TICKS: usize = 10;
@@ -30,18 +31,23 @@ pub struct TickLog<const NY: usize> {
 pub struct LoggedTick<const NY: usize> {
     /// Low 16 bits of each sensor's counts from position 0.
     pub counts: Vec<[u8; 2], NY, u8>,
-    /// Command to the motor: a duty cycle, or a share of the largest force, 32767 at full scale; [`OFF`] if there was
-    /// none.
+    /// Command to the motor: a duty cycle, or a share of the largest force, 32767 at full scale, or the pulses of the
+    /// tick; [`OFF`] if there was none.
     pub drive: [u8; 2],
 }
 
 impl<const NY: usize> LoggedTick<NY> {
-    /// A tick at these counts, with this duty from -1 to 1; `None`: the motor is off.
-    pub fn new(counts: &[i32; NY], duty: Option<f32>) -> Self {
-        let rounded = |duty: f32| (f32::from(i16::MAX) * duty + f32::copysign(0.5, duty)) as i16;
+    /// A tick at these counts, with this output.
+    pub fn new(counts: &[i32; NY], output: &Output) -> Self {
+        let duty = output.duty;
+        let drive = match output.drive {
+            _ if !output.enable => OFF,
+            Drive::Steps(pulses) => pulses as i16,
+            _ => (f32::from(i16::MAX) * duty + f32::copysign(0.5, duty)) as i16,
+        };
         Self {
             counts: counts.iter().map(|&count| (count as u16).to_le_bytes()).collect(),
-            drive: duty.map_or(OFF, rounded).to_le_bytes(),
+            drive: drive.to_le_bytes(),
         }
     }
 }

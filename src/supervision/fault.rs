@@ -228,7 +228,8 @@ impl Fault {
             fault: Fault::Clock,
             name: "clock",
             condition: "crystal or PLL have not started, or the crystal has another frequency than the board's: the \
-                        firmware runs from the internal clock, at another tick, and never arms",
+                        firmware runs from the internal clock, at another tick, and never arms; or a stepper's pulses \
+                        did not end in time",
             reaction: Reaction::Ticks(1),
             remedy: "flash the image for this board, or check its crystal; then reset",
         },

@@ -4,6 +4,8 @@
 //! constants also come from the host, keep the cart near the middle. Whatever the host sends, the force is bounded and
 //! changes slowly, and the rig stays within limits of its own: rail, speed, angle, rates, duration. When the host is
 //! silent or the time is over, spring and damper bring the cart back, and then the motor goes off.
+//!
+//! For a drive with pulses, accelerations of the cart (m/s²) take the place of all these forces.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -17,6 +19,8 @@ use crate::table::Limits;
 pub const FORCES: usize = 10;
 /// Length of the ring buffer; it holds the forces for the next `AHEAD - 1` ticks.
 pub const AHEAD: usize = 64;
+/// Ticks without a command after which the host may count as silent: it answers to messages of up to ten ticks.
+const MOST_SILENT: u16 = 2 * FORCES as u16;
 /// Value in a command that stands for the largest force.
 pub const FULL: i8 = i8::MAX;
 
@@ -41,23 +45,25 @@ const RATE_OF_SPEED: f32 = 4.0;
 /// Time within which the force of the jog has to move everything by more than a count: cart, links (s). Other
 /// forces have to do so within the same impulse.
 pub const STILL_S: [f32; 2] = [0.25, 0.5];
+/// Share of the cart's speed limit that a drive with pulses uses.
+pub const SPEED_SHARE: f32 = 0.9;
 /// Unit in which impulses are counted: this fraction of the jog force, for one tick.
 const IMPULSE: f32 = 1.0 / 32.0;
 
 /// How the rig is shaken, as commanded by the host.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shaking {
-    /// Largest force (N).
+    /// Largest force (N); for a drive with pulses, largest acceleration of the cart (m/s²).
     pub most_n: f32,
-    /// Stiffness of the spring that pulls the cart to the middle (N/m).
+    /// Stiffness of the spring that pulls the cart to the middle (N/m, or 1/s²).
     pub stiffness_n_per_m: f32,
-    /// Constant of the damper on the cart (N·s/m).
+    /// Constant of the damper on the cart (N·s/m, or 1/s).
     pub damping_n_s_per_m: f32,
 }
 
 impl Shaking {
-    /// Whether the largest force is positive and at most `force_limit_n` (N), and both constants are finite and not
-    /// negative.
+    /// Whether the largest force is positive and at most `force_limit_n` (N, or m/s²), and both constants are finite
+    /// and not negative.
     pub fn is_sound(&self, force_limit_n: f32) -> bool {
         let constants = [self.stiffness_n_per_m, self.damping_n_s_per_m];
         self.most_n > 0.0
@@ -131,8 +137,8 @@ impl<const NY: usize> Shaker<NY> {
         self.speed_m_per_s
     }
 
-    /// Tick `now`, with the sensors at `counts`; `step` is the travel per count (m or rad). Returns the force (N), or
-    /// `None` when the shaking has ended.
+    /// Tick `now`, with the sensors at `counts`; `step` is the travel per count (m or rad). Returns the force (N, or
+    /// m/s²), or `None` when the shaking has ended.
     ///
     /// # Errors
     /// The fault, and the sensor, if it concerns one.
@@ -152,8 +158,9 @@ impl<const NY: usize> Shaker<NY> {
         if let Some(waiting) = self.ring.get_mut(now as usize % AHEAD) {
             core::mem::swap(&mut pushed, waiting);
         }
-        let is_over =
-            f32::from(self.silent_ticks) * tick_s >= SILENCE_S || self.ticks as f32 * tick_s >= LONGEST_S;
+        // In slow ticks, the log, to which the host answers, comes later.
+        let is_silent = f32::from(self.silent_ticks) * tick_s >= SILENCE_S && self.silent_ticks > MOST_SILENT;
+        let is_over = is_silent || self.ticks as f32 * tick_s >= LONGEST_S;
         if is_over || self.return_ticks > 0 {
             pushed = 0;
             self.return_ticks = self.return_ticks.saturating_add(1);

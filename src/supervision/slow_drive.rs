@@ -1,4 +1,5 @@
-//! A drive with pulses while no control law commands it: it holds the cart, moves it slowly, or brings it to rest.
+//! A drive with pulses while no control law commands it: it holds the cart, moves it slowly, shakes it, or brings it to
+//! rest.
 
 use crate::table::StepMap;
 
@@ -43,10 +44,22 @@ impl SlowDrive {
     pub fn pulses(&mut self, map: &StepMap, tick_s: f32) -> i32 {
         let wanted = (self.wanted_m_per_s - self.speed_m_per_s) / tick_s;
         let acceleration = map.limited(wanted, self.speed_m_per_s, tick_s);
-        let before = self.speed_m_per_s;
         // Exactly the requested speed in the end, so that a cart that is at rest stays there.
         let is_there = acceleration == wanted;
-        self.speed_m_per_s = if is_there { self.wanted_m_per_s } else { before + acceleration * tick_s };
+        let reached = self.speed_m_per_s + acceleration * tick_s;
+        self.reach(if is_there { self.wanted_m_per_s } else { reached }, map, tick_s)
+    }
+
+    /// Accelerates by `wanted` (m/s²) within the limits of the drive; returns the acceleration, and the pulses of this
+    /// tick of `tick_s` (s).
+    pub fn accelerate(&mut self, wanted: f32, map: &StepMap, tick_s: f32) -> (f32, i32) {
+        let acceleration = map.limited(wanted, self.speed_m_per_s, tick_s);
+        (acceleration, self.reach(self.speed_m_per_s + acceleration * tick_s, map, tick_s))
+    }
+
+    /// The pulses of a tick, at the end of which the drive has this speed.
+    fn reach(&mut self, speed_m_per_s: f32, map: &StepMap, tick_s: f32) -> i32 {
+        let before = core::mem::replace(&mut self.speed_m_per_s, speed_m_per_s);
         let steps = self.rest + 0.5 * (before + self.speed_m_per_s) * tick_s / map.step_m;
         let whole = (steps + f32::copysign(0.5, steps)) as i32;
         self.rest = steps - whole as f32;
@@ -89,6 +102,22 @@ mod tests {
         assert_eq!(until_rest(&mut drive), (0, 0));
         drive.take_over(f32::NAN);
         assert_eq!(until_rest(&mut drive), (0, 0));
+    }
+
+    #[test]
+    fn an_acceleration_moves_the_cart_as_far_as_it_should_and_stays_within_the_limits() {
+        let mut drive = SlowDrive::default();
+        let sum: i32 = (0..200).map(|_| drive.accelerate(2.0, &MAP, TICK_S).1).sum();
+        // 2 m/s² for 0.2 s: 40 mm.
+        assert!((sum - 4000).abs() <= 1, "{sum}");
+        assert_eq!(drive.accelerate(90.0, &MAP, TICK_S).0, 10.0);
+        for _ in 0..100 {
+            drive.accelerate(90.0, &MAP, TICK_S);
+        }
+        assert!(drive.accelerate(90.0, &MAP, TICK_S).1 <= 51, "the drive's largest speed");
+        drive.want(0.0);
+        let (_, ticks) = until_rest(&mut drive);
+        assert!((50..=51).contains(&ticks), "{ticks}");
     }
 
     #[test]

@@ -15,7 +15,8 @@ part! {
         pub angle_rad: f32,
         /// Largest speed of the cart (m/s).
         pub speed_m_per_s: f32,
-        /// Largest force of the jog (N).
+        /// Largest force of the jog (N). For a drive with pulses, an acceleration (m/s²) that moves the links while
+        /// the rig is shaken.
         pub jog_force_n: f32,
         /// Least supply voltage of the power stage (V).
         pub supply_min_v: f32,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::bus::{Bus, Conditions, Driven};
+use crate::bus::{Bus, Conditions, Driven, Pulse};
 use crate::chip::Chip;
 use crate::clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND};
 use crate::error::{Note, Rules, Stopped, Violation};
@@ -92,7 +92,7 @@ pub struct PowerStage {
     pub period_clocks: u32,
     /// Timer clocks per period with PWM high: by the active compare value, not the preloaded one.
     pub high_clocks: u32,
-    /// When the PWM timer was last started.
+    /// When code last set whether the PWM timer counts.
     pub started_at: Time,
 }
 
@@ -293,6 +293,18 @@ impl SimulatedBoard {
     pub fn driven(&mut self) -> Driven {
         self.machine.bus.settle_output();
         self.machine.bus.driven
+    }
+
+    /// Records every pulse of the motor timer's output from now on.
+    pub fn record_pulses(&mut self) {
+        self.machine.bus.settle_output();
+        self.machine.bus.pwm.edges.get_or_insert_default();
+    }
+
+    /// Pulses since the last call that were recorded.
+    pub fn pulses(&mut self) -> Vec<Pulse> {
+        self.machine.bus.settle_output();
+        std::mem::take(&mut self.machine.bus.pulses)
     }
 
     /// Present levels at the power stage's inputs.

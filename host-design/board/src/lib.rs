@@ -61,7 +61,7 @@ pub mod single_step;
 mod wiring;
 
 pub use board::{Input, PowerStage, SimulatedBoard};
-pub use bus::{Conditions, Driven};
+pub use bus::{Conditions, Driven, Pulse};
 pub use chip::Chip;
 pub use clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND, seconds};
 pub use decode::is_wide;

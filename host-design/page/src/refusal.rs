@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use upright_design::design::DesignError;
 use upright_design::export::NoHeader;
 use upright_design::harness::HarnessError;
-use upright_design::rig::{ForceOnly, RigError};
+use upright_design::rig::RigError;
 use upright_design::simulate::SimulationError;
 use upright_design::swing_up::SwingUpError;
 use upright_design::table::NoTable;
@@ -35,8 +35,6 @@ pub(crate) enum PageRefusal {
     Fingerprint(#[from] FingerprintError),
     #[error(transparent)]
     Firmware(#[from] HarnessError),
-    #[error(transparent)]
-    ForceOnly(#[from] ForceOnly),
     #[error("the design has no such law: choose one of the page")]
     Law,
     #[error(transparent)]

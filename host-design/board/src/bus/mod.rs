@@ -38,6 +38,21 @@ pub struct Driven {
     pub enabled: Time,
 }
 
+/// A pulse of the motor timer's output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pulse {
+    /// When it begins.
+    pub at: Time,
+    /// How long it is; `None` while it lasts.
+    pub width: Option<Time>,
+    /// Level of the direction pin; high is along +x.
+    pub along: bool,
+    /// When the direction pin got this level.
+    pub turned_at: Time,
+    /// Level of the enable pin.
+    pub enabled: bool,
+}
+
 /// What differs from board to board and from power-on to power-on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
@@ -115,6 +130,10 @@ pub(crate) struct Bus {
     pub(crate) power: Power,
     pub(crate) driven: Driven,
     driven_until: Time,
+    /// Level of the direction pin, and when it got it.
+    direction: (bool, Time),
+    /// Recorded pulses, if there are to be any.
+    pub(crate) pulses: Vec<Pulse>,
     /// The watchdog has requested a reset.
     pub(crate) watchdog_reset: bool,
     /// Address of a register whose next write is lost.
@@ -175,6 +194,8 @@ impl Bus {
             is_calibrated: conditions.is_calibrated,
             driven: Driven::default(),
             driven_until: 0,
+            direction: (false, 0),
+            pulses: Vec::new(),
             watchdog_reset: false,
             lost_write: None,
             lost_write_is_hidden: false,

@@ -1,6 +1,6 @@
 //! Signals between pins and peripherals.
 
-use super::{Bus, Driven};
+use super::{Bus, Driven, Pulse};
 use crate::clock::Time;
 use crate::peripherals::encoder_timer::Shaft;
 use crate::peripherals::gpio::ExternalLevel;
@@ -74,7 +74,8 @@ impl Bus {
         }
         let high = self.pwm.high - before;
         let span = self.now - self.driven_until;
-        self.driven_until = self.now;
+        // A pin is written only after this: the level that it has now, it has had since then.
+        let since = std::mem::replace(&mut self.driven_until, self.now);
         let (pwm, along) = (self.wiring.pwm, self.output_level(self.wiring.direction));
         let high = if self.is_alternate(pwm, 1) {
             high
@@ -84,11 +85,29 @@ impl Bus {
             0
         };
         let enabled = self.output_level(self.wiring.enable);
+        if along != self.direction.0 {
+            self.direction = (along, since);
+        }
+        self.keep_pulses(enabled);
         let Driven { along: plus, against: minus, pwm_high, enabled: enabled_time } = &mut self.driven;
         *pwm_high += high;
         if enabled {
             *enabled_time += span;
             *(if along { plus } else { minus }) += high;
+        }
+    }
+
+    /// Turns the edges of the motor timer's output into pulses, of a time in which no pin has changed its level.
+    fn keep_pulses(&mut self, enabled: bool) {
+        let (is_routed, (along, turned_at)) = (self.is_alternate(self.wiring.pwm, 1), self.direction);
+        for (at, is_high) in self.pwm.edges.iter_mut().flat_map(|edges| edges.drain(..)) {
+            match (is_high, self.pulses.last_mut()) {
+                (true, _) if is_routed => {
+                    self.pulses.push(Pulse { at, width: None, along, turned_at, enabled });
+                }
+                (false, Some(pulse)) if pulse.width.is_none() => pulse.width = Some(at - pulse.at),
+                _ => {}
+            }
         }
     }
 

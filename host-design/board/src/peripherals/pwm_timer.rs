@@ -39,8 +39,11 @@ pub(crate) struct PwmTimer {
     pub(crate) break_ignored: bool,
     /// Time for which the output was high, since power-on.
     pub(crate) high: Time,
-    /// When the counter was last started.
+    /// When code last set whether the counter counts.
     pub(crate) started_at: Time,
+    /// Changes of the pin's level, if they are recorded.
+    pub(crate) edges: Option<Vec<(Time, bool)>>,
+    was_high: bool,
 }
 
 impl PwmTimer {
@@ -68,6 +71,8 @@ impl PwmTimer {
             break_ignored: false,
             high: 0,
             started_at: 0,
+            edges: None,
+            was_high: false,
         }
     }
 
@@ -76,6 +81,7 @@ impl PwmTimer {
         *self = Self::new(old.is_complementary);
         (self.high, self.synced, self.break_level) = (old.high, now, old.break_level);
         self.break_ignored = old.break_ignored;
+        (self.edges, self.was_high) = (old.edges, old.was_high);
     }
 
     pub(crate) fn bits(&self, offset: u32) -> Option<Bits> {
@@ -118,9 +124,7 @@ impl PwmTimer {
                 if value & 0x70 != 0 {
                     return Err(Violation::NotModelled("TIM1 counting down or centred"));
                 }
-                if value & ENABLED != 0 {
-                    self.started_at = now;
-                }
+                self.started_at = now;
                 self.control = value;
             }
             0x04 if value & !0x300 == 0 => {
@@ -292,6 +296,7 @@ impl PwmTimer {
 
     /// Advances to `now` without counting: the pin keeps its level.
     pub(crate) fn stand_still(&mut self, now: Time) {
+        self.record(self.synced, self.count);
         self.high += if self.level() { now - self.synced } else { 0 };
         self.synced = now;
     }
@@ -310,6 +315,11 @@ impl PwmTimer {
             // The counter may have been written beyond its end: it then wraps at its width.
             let end = if self.count > self.period_active { 0xffff } else { self.period_active };
             let clocks = due.min(Time::from(end - self.count) + 1) as u32;
+            self.record(self.synced, self.count);
+            if (self.count + 1..self.count + clocks).contains(&self.compare_active) {
+                let until = Time::from(self.compare_active - self.count);
+                self.record(self.synced + tick * until, self.compare_active);
+            }
             self.high += tick * Time::from(self.high_clocks(self.count, self.count + clocks));
             self.synced += tick * Time::from(clocks);
             self.count += clocks;
@@ -317,6 +327,19 @@ impl PwmTimer {
                 self.count = 0;
                 if self.repetitions_left == 0 { self.update() } else { self.repetitions_left -= 1 }
             }
+        }
+    }
+
+    /// Records that the pin has the level of a counter value at a time.
+    fn record(&mut self, at: Time, count: u32) {
+        if self.edges.is_none() {
+            return;
+        }
+        let is_high = self.level_at(count);
+        if is_high != std::mem::replace(&mut self.was_high, is_high)
+            && let Some(edges) = &mut self.edges
+        {
+            edges.push((at, is_high));
         }
     }
 

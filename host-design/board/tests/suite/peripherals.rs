@@ -60,6 +60,34 @@ fn one_pulse_drives_its_periods_and_stops_low() {
     assert!(!stage.pwm && stage.enable && stage.main_output && stage.along);
 }
 
+/// Pulses of the timer in a run of `code` (timer clocks): when each begins after the first, and its width.
+fn pulses(code: &Code) -> Vec<[Time; 2]> {
+    let mut board = board(code, &[], Rules::STRICT);
+    board.apply(CLOSED);
+    board.record_pulses();
+    board.run_until(1_000 * US).unwrap();
+    let (clock, pulses) = (UNITS_PER_SECOND / 16_000_000, board.pulses());
+    assert!(pulses.iter().all(|pulse| pulse.enabled && pulse.along && pulse.turned_at < pulse.at));
+    assert!(board.pulses().is_empty());
+    pulses
+        .iter()
+        .map(|pulse| [pulse.at - pulses[0].at, pulse.width.unwrap()].map(|time| time / clock))
+        .collect()
+}
+
+#[test]
+fn every_pulse_is_recorded_with_its_time_and_a_restart_cuts_what_is_left() {
+    let joined = |parts: &[Code]| Code(parts.iter().flat_map(|part| part.0.iter().copied()).collect());
+    let whole = pulses(&joined(&[pwm(), start()]));
+    assert_eq!(whole, [[0, 200], [800, 200], [1600, 200]]);
+    // Within the second period; nothing tells how many are left.
+    let wait = Code(vec![NOP; 900]);
+    let again = Code::new().log(TIM1 + 0x30, 4).write(TIM1 + 0x14, 1).write(TIM1, 1 << 3 | 1);
+    let cut = joined(&[pwm(), start(), wait, again]);
+    assert_eq!(pulses(&cut).len(), 4);
+    assert_eq!(logged(&after(&cut, &[CLOSED], 1_000), 4), 2);
+}
+
 #[test]
 fn a_lost_period_means_full_force() {
     let main = Code(pwm().0.into_iter().chain(start().0).collect());

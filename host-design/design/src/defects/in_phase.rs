@@ -84,6 +84,10 @@ impl Defect {
             | Defect::EncodersSwapped
             | Defect::MotorDead
             | Defect::MotorReversed
+            | Defect::CartJammed
+            | Defect::PulsesMissing
+            | Defect::SomePulsesMissing
+            | Defect::StepsLost
             | Defect::Push => Some(Expected::Bounded),
             Defect::ArmUnhomed
             | Defect::ArmHanging
@@ -92,11 +96,7 @@ impl Defect {
             | Defect::CrystalMissing
             | Defect::CrystalWrong
             | Defect::ChipWrong
-            | Defect::WriteLost
-            | Defect::CartJammed
-            | Defect::PulsesMissing
-            | Defect::SomePulsesMissing
-            | Defect::StepsLost => None,
+            | Defect::WriteLost => None,
             _ => Some(self.expected()),
         }
     }

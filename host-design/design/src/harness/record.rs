@@ -140,6 +140,8 @@ struct RunRecord {
     pending: VecDeque<Pending>,
     next_tick: Option<u32>,
     telemetry_ticks: u32,
+    /// Whether the drive takes pulses: what it applies is an acceleration that only the firmware knows.
+    takes_pulses: bool,
     fall: Option<Fall>,
     fault: Option<Fault>,
     worst_cycles: u32,
@@ -153,6 +155,7 @@ impl RunRecord {
             pending: VecDeque::new(),
             next_tick: None,
             telemetry_ticks,
+            takes_pulses: rig.actuator.acceleration.is_some(),
             fall: None,
             fault: None,
             worst_cycles: 0,
@@ -186,7 +189,7 @@ impl RunRecord {
                 target,
                 setpoint: f64::from(telemetry.setpoint_m),
                 requested: f64::from(telemetry.requested_n),
-                force,
+                force: if self.takes_pulses { f64::from(telemetry.applied_n) } else { force },
                 state: &state,
                 estimate: &estimate,
             });

@@ -31,6 +31,8 @@ pub struct Session<'a> {
     logs: VecDeque<AnyTickLog>,
     status: Status,
     fault: Option<Fault>,
+    /// The tick of that fault.
+    cause_tick: u32,
     ticks: u32,
 }
 
@@ -48,6 +50,7 @@ impl<'a> Session<'a> {
             logs: VecDeque::new(),
             status: Status { state: State::Disarmed, signs: Signs::Unchecked, motor: MotorSign::Unchecked },
             fault: None,
+            cause_tick: 0,
             ticks: 0,
         }
     }
@@ -107,7 +110,7 @@ impl<'a> Session<'a> {
         for &byte in &self.serial {
             match self.client.receive(byte, NOW) {
                 Some(Received::Telemetry(telemetry)) => {
-                    self.fault = telemetry.fault;
+                    (self.fault, self.cause_tick) = (telemetry.fault, telemetry.cause_tick);
                     let AnyTelemetry { state, signs, motor, .. } = telemetry;
                     self.status = Status { state, signs, motor };
                     self.telemetry.push_back(telemetry);
@@ -143,6 +146,15 @@ impl<'a> Session<'a> {
     /// The latched fault according to the last telemetry.
     pub fn fault(&self) -> Option<Fault> {
         self.fault
+    }
+
+    /// Number of ticks since the latched fault, according to the last telemetry; `None` without one, and if the
+    /// firmware has restarted since.
+    pub fn ticks_since_fault(&self) -> Option<usize> {
+        let since = self.ticks.wrapping_sub(1).wrapping_sub(self.cause_tick);
+        // No telemetry is on its way for longer.
+        let latest = u32::from(self.pace().telemetry_ticks) + 4;
+        self.fault.filter(|_| since <= latest).map(|_| since as usize)
     }
 
     /// What the last telemetry says about the firmware.

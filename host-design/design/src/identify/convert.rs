@@ -20,7 +20,8 @@ const ONLY: [u8; 2] = 1u16.to_le_bytes();
 
 impl Log {
     /// Writes every tick as CSV: its number and time, each channel's deviation from hanging in counts and in its unit,
-    /// the drive as duty or force, supply and contacts. `steps` holds the travel per count of each channel (m or rad).
+    /// the drive as duty, force or pulses, supply and contacts. `steps` holds the travel per count of each channel (m,
+    /// rad).
     ///
     /// # Errors
     /// Those of writing to `out`.
@@ -73,7 +74,12 @@ impl Log {
         columns.extend(joints.clone().map(|joint| format!("joint{joint}_counts")));
         columns.push("x_m".to_owned());
         columns.extend(joints.map(|joint| format!("joint{joint}_rad")));
-        columns.push(if self.header.drive == DriveScale::Duty { "duty" } else { "force_n" }.to_owned());
+        let drive = match self.header.drive {
+            DriveScale::Duty => "duty",
+            DriveScale::Force(_) => "force_n",
+            DriveScale::Steps(_) => "pulses",
+        };
+        columns.push(drive.to_owned());
         columns.push("supply_v".to_owned());
         columns.extend(CONTACTS.map(|contact| contact.replace(' ', "_")));
         columns

@@ -9,7 +9,7 @@ use super::error::IdentifyError;
 use super::estimate::{Settings, identify};
 use super::estimated::Identification;
 use super::excite::shake_machine;
-use super::machines::DrawnMachine;
+use super::machines::{DrawnMachine, TrueFriction};
 use super::parameters::ParameterKind;
 use crate::rig::Rig;
 use crate::study::{Study, StudyError};
@@ -85,6 +85,7 @@ impl CoveredQuantity {
             ParameterKind::Zero(_) => Self::Zero,
             ParameterKind::AirDrag(_)
             | ParameterKind::Presliding(_)
+            | ParameterKind::Travel
             | ParameterKind::EccentricSine(_)
             | ParameterKind::EccentricCosine(_) => return None,
         })
@@ -158,6 +159,8 @@ pub struct Drawn {
     pub off_percent: f64,
     /// Duration of each log (s).
     pub seconds: f64,
+    /// Law of the machines' dry friction.
+    pub friction: TrueFriction,
     /// Seed of the machines.
     pub seed: u64,
     /// Whether to skip the check of the wiring; it is always that of the file.
@@ -212,7 +215,7 @@ pub fn coverage(
 /// # Errors
 /// [`IdentifyError`] if the rig has no chain with encoders; later failures are in [`Identified::refused`].
 pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, CoverageError> {
-    let machine = DrawnMachine::draw(file, drawn.off_percent, drawn.seed, number)?;
+    let machine = DrawnMachine::draw(file, drawn.off_percent, drawn.friction, drawn.seed, number)?;
     let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };
     let found = shake_machine(file, &machine.rig, drawn.seconds, number)
         .and_then(|log| identify(file, &[(PathBuf::from("log"), log)], &settings, &|_| ()));
@@ -241,11 +244,13 @@ fn missed(machine: &DrawnMachine, found: &Identification) -> Vec<Missed> {
     // The shape is what does not depend on the scale of the force.
     let ratio = |kind: ParameterKind| Some(found.estimate(kind)?.new / machine.truth(kind)?);
     let moments = found.estimates.iter().filter_map(|estimate| match estimate.kind {
-        ParameterKind::FirstMoment(link) => Some(link),
+        ParameterKind::SecondMoment(link) => Some(link),
         _ => None,
     });
     let Some(last) = moments.max() else { return all };
-    let Some(scale) = ratio(ParameterKind::FirstMoment(last)) else { return all };
+    // If the drive imposes the cart's motion, the true values are ratios, too.
+    let of_force = ratio(ParameterKind::FirstMoment(last)).filter(|_| !found.is_moved);
+    let Some(scale) = of_force.or(found.is_moved.then_some(1.0)) else { return all };
     let error = |quantity: CoveredQuantity, error: f64| Missed { quantity, error, deviation: None };
     for link in 0..=last {
         let [first, second] =
@@ -258,6 +263,6 @@ fn missed(machine: &DrawnMachine, found: &Identification) -> Vec<Missed> {
                 .map(|ratio| error(CoveredQuantity::Shape, ratio - 1.0)),
         );
     }
-    all.push(error(CoveredQuantity::Scale, scale - 1.0));
+    all.extend(of_force.map(|scale| error(CoveredQuantity::Scale, scale - 1.0)));
     all
 }

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::cart_force::CartForce;
 use super::free::{self, fit};
-use super::model::{CartForce, Model};
+use super::model::Model;
 use super::parameters::{Layout, priors};
 use super::record::Record;
 use super::shooting::Shooting;

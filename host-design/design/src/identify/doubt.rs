@@ -22,6 +22,13 @@ pub enum Doubt {
     },
     /// The friction of the cart or of the joints at rest is larger than in motion, by these shares.
     LargerAtRest([f64; 2]),
+    /// A step of the drive that imposes the cart's motion moves it by another distance than the file says.
+    Travel {
+        /// Travel per step, as a multiple of that of the file.
+        share: f64,
+        /// Its standard deviation.
+        deviation: f64,
+    },
     /// The model leaves far more of the measurements unexplained than the sensor would.
     Residual {
         /// The cart, or a joint from 1.
@@ -64,6 +71,13 @@ impl core::fmt::Display for Doubt {
                  frictions above are those in motion; give breakaway_percent in [reality].",
                 100.0 * cart,
                 100.0 * joints
+            ),
+            Doubt::Travel { share, deviation } => write!(
+                f,
+                "A step moves the cart by {} times step_m (deviation {}): correct step_m, the driver's microsteps, or the \
+                 pulley in the file. Lengths and moments are wrong until then.",
+                significant(*share, 4),
+                significant(*deviation, 2)
             ),
             Doubt::Residual { channel, allowed, times } => write!(
                 f,

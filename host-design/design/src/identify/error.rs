@@ -77,6 +77,14 @@ pub enum IdentifyError {
         /// What to do.
         remedy: String,
     },
+    /// The counts of a drive with pulses are not those of its pulses.
+    #[error("{}: {found}; the board has to count the pulses that it gives, with their sign", file.display())]
+    Pulses {
+        /// Path of the log.
+        file: PathBuf,
+        /// How the counts differ.
+        found: String,
+    },
     /// The pieces of the log without a gap are too short in total.
     #[error("{seconds:.1} s of log without a gap, at least {least} s are needed; record more")]
     TooShort {
@@ -118,6 +126,7 @@ impl IdentifyError {
                 | IdentifyError::Table { .. }
                 | IdentifyError::NoEncoders(_)
                 | IdentifyError::OtherRig { .. }
+                | IdentifyError::Pulses { .. }
         )
     }
 }

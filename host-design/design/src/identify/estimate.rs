@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use super::at_rest;
 use super::channel::chain_of;
 use super::covariance::{changes, deviations};
+use super::creeping;
 use super::doubt::Doubt;
 use super::error::IdentifyError;
 use super::estimated::{Estimate, Identification};
 use super::free;
+use super::imposed;
 use super::log::Log;
 use super::model::Model;
 use super::old_values::old_values;
@@ -18,6 +20,7 @@ use super::realise::realise;
 use super::record::Record;
 use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
+use super::travel;
 use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
 use super::window_errors::{WindowErrors, window_errors};
 use super::wiring;
@@ -100,7 +103,9 @@ pub fn identify_recordings(
         delay_ticks: rig.tick.delay_ticks,
         ..Identification::of_record(&record)
     };
-    if !is_driven {
+    if record.is_moved {
+        imposed::known(model.layout, &mut priors);
+    } else if !is_driven {
         free::known(rig, model.layout, &mut priors, record.is_clamped);
     }
     if is_driven && !settings.trust_wiring {
@@ -212,6 +217,8 @@ impl Fitted<'_> {
         let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
         // Noise and smoothing were tuned for the parameters before this fit.
         let model = with_friction_laws(&filter, &p, &noise);
+        let creeping = creeping::found(&Filter { model: &model, ..filter }, &p, &noise);
+        let (model, p) = creeping.unwrap_or((model, p));
         found.doubts.extend(Doubt::of_excess(model.excess));
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);
@@ -219,8 +226,11 @@ impl Fitted<'_> {
         progress(ProgressStep::Begin("deviations", 1));
         let inverse = normal.factor(0.0).ok_or_else(undetermined)?.inverse();
         let changes = changes(&filter, self.finer, &p, &noise);
+        if self.used.is_moved {
+            found.doubts.extend(travel::doubted_travel(&filter, &p, &noise));
+        }
         let kinds = model.layout.kinds();
-        let deviations = deviations(&kinds, self.priors, &inverse, &changes, &p, &self.used.steps);
+        let deviations = deviations(&kinds, self.priors, &inverse, &changes, &p, self.used);
         let active: Vec<usize> = (0..p.len()).filter(|&i| self.priors[i].deviation > 0.0).collect();
         found.estimates = active
             .iter()
@@ -248,7 +258,7 @@ impl Fitted<'_> {
         let old = old_values(self.rig, model.layout, &start, &p);
         let held = self.held_out(&model, [&old, &p]);
         let ranges: Vec<f64> = (0..self.used.channels).map(|channel| self.used.extent(channel)[1]).collect();
-        found.channels = channels(&over, held, &ranges);
+        found.channels = channels(&over, held, &ranges, self.used.first_channel());
         Ok(())
     }
 

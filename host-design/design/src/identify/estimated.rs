@@ -46,6 +46,9 @@ pub struct Identification {
     pub channels: Vec<ChannelFit>,
     /// Whether the drive is known, and with it the scale of masses and frictions.
     pub is_driven: bool,
+    /// Whether the drive imposes the cart's motion: then the scale of masses and frictions is that of the file, and the
+    /// cart's own are not seen.
+    pub is_moved: bool,
     /// Errors of predictions of parts of the recordings, each with numbers from the other parts; only without a drive.
     pub left_out: Vec<WindowErrors>,
     /// Errors of predictions of other recordings.
@@ -73,6 +76,7 @@ impl Identification {
             correlations: Vec::new(),
             channels: Vec::new(),
             is_driven: true,
+            is_moved: record.is_moved,
             left_out: Vec::new(),
             predicted: Vec::new(),
             realised: None,

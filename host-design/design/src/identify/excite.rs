@@ -5,12 +5,14 @@ use core::f64::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
-use upright::table::{Equilibrium, Law};
+use upright::supervision::shaking::SPEED_SHARE;
+use upright::supervision::slow_drive::SlowDrive;
+use upright::table::{Equilibrium, Law, StepMap};
 
+use super::cart_force::CartForce;
 use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log, LogHeader, Tick};
-use super::model::CartForce;
 use super::model::Model;
 use super::parameters::{Layout, priors};
 use super::record::Record;
@@ -20,11 +22,15 @@ use crate::plant::{ChainParameters, linearise};
 use crate::reality::hanging_by_hand;
 use crate::rig::{Chain, Rig};
 use crate::simulate::{Bench, Scenario};
+use crate::table::{NoTable, step_map};
 
 /// Number of spectral lines of the excitation, for one link and for more.
 const LINES: [usize; 2] = [16, 24];
 /// Limits of its frequency band, as multiples of the lowest and of the highest hanging mode.
 const BAND: [f64; 2] = [0.25, 1.6];
+/// The lower limit, if the drive imposes the cart's motion: with accelerations of equal size, slow lines need most of
+/// the rail, and no friction of the cart has to be seen in them.
+const LOWEST_MOVED: f64 = 0.7;
 /// Intended motion: largest angle of a link from hanging (rad), and share of the rail.
 pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
 /// A run is abandoned when the cart goes beyond this share of the rail.
@@ -41,11 +47,12 @@ const RAISE: (f64, f64, usize) = (0.8, 1.6, 3);
 const RAMP_S: f64 = 1.0;
 /// Longest trial run that is used to find the amplitude (s).
 const TRIAL_S: f64 = 20.0;
-/// Share of the force limit that the excitation may need.
-const FORCE_SHARE: f64 = 0.8;
+/// Share of the force limit that the excitation may need, or of the limits of a drive that imposes the cart's motion.
+const INPUT_SHARE: f64 = 0.8;
 
 /// A sum of sines of equal force, with a weak spring and damper that keep the cart near the middle:
-/// `u = A r(t) Σ cos(2π f_i t + φ_i) - k_p x - k_d ẋ`.
+/// `u = A r(t) Σ cos(2π f_i t + φ_i) - k_p x - k_d ẋ`. If the drive imposes the cart's motion, u is its acceleration:
+/// m/s² take the place of newtons, and 1 that of the mass.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     /// Amplitude of each line (N).
@@ -69,13 +76,14 @@ impl Excitation {
         let chain = chain_of(rig)?;
         let [lowest, highest] = hanging_modes(chain)?;
         let count = LINES[usize::from(chain.links.len() > 1)];
-        let (from, to) = (BAND[0] * lowest, BAND[1] * highest);
+        let slowest = if rig.actuator.acceleration.is_some() { LOWEST_MOVED } else { BAND[0] };
+        let (from, to) = (slowest * lowest, BAND[1] * highest);
         let mut random = Pcg64::seed_from_u64(seed);
         let line = |i: usize| {
             let share = i as f64 / (count - 1) as f64;
             [from * libm::pow(to / from, share), random.random_range(0.0..TAU)]
         };
-        let mass = ChainParameters::<f64>::of(chain).total_mass;
+        let mass = moved_mass(rig, chain);
         let slow = TAU * 0.15 * lowest;
         let mut excitation = Self {
             amplitude_n: 0.0,
@@ -106,8 +114,8 @@ impl Excitation {
         let model = record.model(chain.gravity_m_per_s2);
         let mut p: Vec<f64> = priors(rig, chain, false).iter().map(|prior| prior.value).collect();
         p[Layout { links: chain.links.len() }.delay()] = 0.0;
-        let weight = p[Layout::TOTAL_MASS] * chain.gravity_m_per_s2;
-        let limit = rig.force_limit_n().unwrap_or(f64::INFINITY);
+        let weight = moved_mass(rig, chain) * chain.gravity_m_per_s2;
+        let limit = rig.input_limit().unwrap_or(f64::INFINITY);
         let (mut low, mut high) = (0.0, weight.min(limit));
         for _ in 0..12 {
             self.amplitude_n = 0.5 * (low + high);
@@ -124,6 +132,7 @@ impl Excitation {
         let m = model.coordinates();
         let dt_s = rig.tick.period_s * Record::usual_stride(rig.tick.period_s) as f64;
         let farthest = AIM.1 * half_rail(chain);
+        let fastest = INPUT_SHARE * speed_limit(rig).unwrap_or(f64::INFINITY);
         let mut state = vec![0.0; model.states()];
         state[1..m].fill(PI);
         let mut step = Step::new(model, false);
@@ -133,7 +142,10 @@ impl Excitation {
             state.copy_from_slice(&step.end);
             let turned = state[1..m].iter().map(|phi| (phi - PI).abs()).fold(0.0, f64::max);
             // Written so that NaN counts as leaving the limits.
-            let stays = turned <= AIM.0 && state[0].abs() <= farthest && force.abs() <= FORCE_SHARE * limit_n;
+            let stays = turned <= AIM.0
+                && state[0].abs() <= farthest
+                && state[m].abs() <= fastest
+                && force.abs() <= INPUT_SHARE * limit_n;
             if !stays {
                 return false;
             }
@@ -146,6 +158,21 @@ impl Excitation {
 pub(super) fn half_rail(chain: &Chain) -> f64 {
     let [low, high] = chain.cart.travel_m;
     high.min(-low)
+}
+
+/// What a unit of the excitation has to move (kg): 1 if the drive imposes the acceleration.
+fn moved_mass(rig: &Rig, chain: &Chain) -> f64 {
+    match rig.actuator.acceleration {
+        Some(_) => 1.0,
+        None => ChainParameters::<f64>::of(chain).total_mass,
+    }
+}
+
+/// Largest speed of a cart whose drive imposes its motion (m/s); none with another drive, or without a limit.
+fn speed_limit(rig: &Rig) -> Option<f64> {
+    let drive = rig.actuator.acceleration.as_ref()?;
+    let both = drive.largest_speed_m_per_s(rig.tick.period_s).into_iter().chain(rig.limits.speed_m_per_s);
+    both.reduce(f64::min)
 }
 
 /// The lowest and the highest frequency of the hanging links (Hz).
@@ -229,7 +256,12 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
         .map(|channel| if channel == 1 { libm::round(PI / steps[1]) as i64 as u16 } else { 0 })
         .collect();
     let full_n = rig.force_limit_n().unwrap_or(10.0 * excitation.amplitude_n * excitation.lines.len() as f64);
-    let scale = if rig.actuator.motor.is_some() { DriveScale::Duty } else { DriveScale::Force(full_n) };
+    let mut pulses = Pulses::of(rig)?;
+    let scale = match (&rig.actuator.acceleration, &rig.actuator.motor) {
+        (Some(drive), _) => DriveScale::Steps(drive.step_m),
+        (None, Some(_)) => DriveScale::Duty,
+        (None, None) => DriveScale::Force(full_n),
+    };
     let mut log = Log::new(LogHeader {
         rig: rig.name.clone(),
         hash: rig.hash(),
@@ -249,7 +281,10 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
         }
         let speed = speed.after(x);
         let force = excitation.force_n(f64::from(number) * period_s, x, speed);
-        let (drive, part) = driven(rig, scale, force, speed);
+        let (drive, part) = match &mut pulses {
+            Some(pulses) => pulses.driven(force, period_s),
+            None => driven(rig, scale, force, speed),
+        };
         bench.tick(drive);
         let volts = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v);
         let supply_mv = (1e3 * volts * bench.supply_share()).round() as u16;
@@ -274,7 +309,31 @@ fn driven(rig: &Rig, scale: DriveScale, force_n: f64, speed: f64) -> (Drive, i16
             let part = of(force_n / full_n);
             (Drive::Force((f64::from(part) / f64::from(i16::MAX) * full_n) as f32), part)
         }
-        (None, DriveScale::Duty) => (Drive::OFF, 0),
+        (None, DriveScale::Duty | DriveScale::Steps(_)) => (Drive::OFF, 0),
+    }
+}
+
+/// The pulses of a drive that imposes the cart's motion, as the firmware gives them.
+struct Pulses {
+    map: StepMap,
+    drive: SlowDrive,
+}
+
+impl Pulses {
+    /// Those of the drive of `rig`, if it has such a one.
+    fn of(rig: &Rig) -> Result<Option<Self>, IdentifyError> {
+        let Some(drive) = &rig.actuator.acceleration else { return Ok(None) };
+        let failed = |error: NoTable| IdentifyError::Excitation(format!("{}: {error}", rig.name));
+        let mut map = step_map(drive, rig.tick.period_s).map_err(failed)?;
+        let most = rig.limits.speed_m_per_s.map_or(f32::MAX, |limit| SPEED_SHARE * limit as f32);
+        map.speed_limit_m_per_s = map.speed_limit_m_per_s.min(most);
+        Ok(Some(Self { map, drive: SlowDrive::default() }))
+    }
+
+    /// The command for an acceleration (m/s²), and its value in the log.
+    fn driven(&mut self, acceleration: f64, period_s: f64) -> (Drive, i16) {
+        let (_, pulses) = self.drive.accelerate(acceleration as f32, &self.map, period_s as f32);
+        (Drive::Steps(pulses), pulses as i16)
     }
 }
 

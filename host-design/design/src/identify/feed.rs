@@ -63,8 +63,11 @@ impl Feed {
         let chain = chain_of(rig)?;
         let excitation = Excitation::of(rig, duration_s, seed)?;
         let period_s = rig.tick.period_s;
-        let limit_n = f64::from(table.force_limit_n);
-        let pulse_n = f64::from(table.limits.jog_force_n).min(limit_n);
+        // The counts of a drive with pulses follow them whatever the cart does.
+        let is_moved = table.steps.is_some();
+        let limit_n =
+            table.steps.map_or(table.force_limit_n, |steps| steps.acceleration_limit_m_per_s2).into();
+        let pulse_n = if is_moved { 0.0 } else { f64::from(table.limits.jog_force_n).min(limit_n) };
         let ticks = (duration_s / period_s) as u32;
         let peak_n =
             (0..ticks).map(|tick| excitation.sines_n(f64::from(tick) * period_s).abs()).fold(0.0, f64::max);
@@ -79,7 +82,7 @@ impl Feed {
             jolt_m_per_s,
             begun: None,
             unsent: 0,
-            checked: 0,
+            checked: if is_moved { PULSES_S.len() } else { 0 },
             gain: 1.0,
             judged: 0,
         })
@@ -134,6 +137,11 @@ impl Feed {
     pub fn is_over(&self, log: &Log) -> bool {
         let last = log.ticks().last().map_or(0, |tick| tick.number);
         self.begun.is_some_and(|begun| last >= begun + self.ticks(LEAD_S + self.excitation.duration_s))
+    }
+
+    /// Whether these are accelerations for a drive with pulses.
+    pub fn is_of_pulses(&self) -> bool {
+        self.pulse_n == 0.0
     }
 
     /// Whether [`begun`](Self::begun) was called.

@@ -234,7 +234,7 @@ fn coarse(record: &Record, rms: &[f64]) -> Vec<Doubt> {
         let times = rms[channel] / allowed;
         (times > COARSE).then(|| Doubt::Residual { channel: channel_name(channel), allowed, times })
     };
-    (usize::from(record.is_clamped)..record.channels).filter_map(one).collect()
+    (record.first_channel()..record.channels).filter_map(one).collect()
 }
 
 /// Standard deviation of an estimate, from its values without one part of the data each (B. Efron, C. Stein, "The
@@ -250,7 +250,7 @@ fn jackknife(without: &[f64]) -> f64 {
 mod tests {
     use std::path::Path;
 
-    use super::super::model::CartForce;
+    use super::super::cart_force::CartForce;
     use super::super::parameters::priors;
     use super::super::step::Step;
     use super::super::table::RecordingRows;

@@ -7,19 +7,19 @@
 //! |---|---|---|
 //! | mark | 8 | `UPRTLOG1` |
 //! | header | 1 | encoders: cart and joints, y |
-//! | | 1 | 0: the drive is a duty; 1: a force |
+//! | | 1 | 0: the drive is a duty; 1: a force; 2: pulses |
 //! | | 1 | length of the name |
 //! | | | name of the rig, UTF-8 |
 //! | | 8 | hash of the rig |
 //! | | 4 | control period (ns) |
-//! | | 8 | force at full scale (N), as a 64-bit float; 1 with a duty |
+//! | | 8 | force at full scale (N), or travel per pulse (m), as a 64-bit float; 1 with a duty |
 //! | | 2 y | counter values with the cart at 0 and the links hanging, low 16 bits |
 //! | | 4 | checksum of the header |
 //! | frame | 4 | number of its first tick |
 //! | | 1 | ticks k, 1 to 10 |
 //! | | 1 | contacts: bit 0 lower limit, 1 upper limit, 2 emergency stop, 3 driver fault |
 //! | | 2 | supply (mV), 0 if it is not measured |
-//! | | k (2 y + 2) | for each tick the counters, and the drive from -32767 to 32767; -32768 while the motor is off and coasts |
+//! | | k (2 y + 2) | for each tick the counters, and the drive from -32767 to 32767, or the pulses of the tick; -32768 while the motor is off and coasts |
 //! | | 4 | checksum of the frame |
 
 use std::io::{self, Read};
@@ -44,6 +44,8 @@ pub enum DriveScale {
     Duty,
     /// A force: this many newtons at full scale.
     Force(f64),
+    /// Pulses, each of which moves the cart by so much (m).
+    Steps(f64),
 }
 
 /// Header of a log: the rig, and how its ticks are to be read.
@@ -66,7 +68,8 @@ pub struct LogHeader {
 pub struct Tick {
     /// Number of the tick.
     pub number: u32,
-    /// Applied duty or force, 32767 at full scale; [`OFF`] while the motor is off and turns freely.
+    /// Applied duty or force, 32767 at full scale, or the pulses of the tick; [`OFF`] while the motor is off and turns
+    /// freely.
     pub drive: i16,
     /// Supply (mV); 0 if it is not measured.
     pub supply_mv: u16,
@@ -224,12 +227,13 @@ impl Log {
         bytes
     }
 
-    /// Drive of a tick: a duty from -1 to 1, or a force (N); 0 while the motor was off.
+    /// Drive of a tick: a duty from -1 to 1, a force (N), or pulses; 0 while the motor was off.
     pub fn drive(&self, tick: &Tick) -> f64 {
-        let part = if tick.drive == OFF { 0.0 } else { f64::from(tick.drive) / f64::from(i16::MAX) };
+        let value = if tick.drive == OFF { 0.0 } else { f64::from(tick.drive) };
         match self.header.drive {
-            DriveScale::Duty => part,
-            DriveScale::Force(full_n) => part * full_n,
+            DriveScale::Duty => value / f64::from(i16::MAX),
+            DriveScale::Force(full_n) => value / f64::from(i16::MAX) * full_n,
+            DriveScale::Steps(_) => value,
         }
     }
 }
@@ -240,6 +244,7 @@ impl LogHeader {
         let (kind, full) = match self.drive {
             DriveScale::Duty => (0, 1.0),
             DriveScale::Force(full_n) => (1, full_n),
+            DriveScale::Steps(step_m) => (2, step_m),
         };
         let mut body = vec![self.hanging.len() as u8, kind, name.len() as u8];
         body.extend(name);
@@ -277,6 +282,7 @@ fn header(bytes: &[u8]) -> Result<(LogHeader, &[u8]), LogError> {
     let drive = match kind {
         0 => DriveScale::Duty,
         1 if full.is_finite() && full > 0.0 => DriveScale::Force(full),
+        2 if full.is_finite() && full > 0.0 => DriveScale::Steps(full),
         _ => return Err(damaged()),
     };
     let rig = core::str::from_utf8(name).map_err(|_| damaged())?.to_owned();

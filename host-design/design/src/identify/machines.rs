@@ -10,7 +10,7 @@ use super::error::IdentifyError;
 use super::parameters::{FRICTION, Layout, ParameterKind, priors};
 use crate::plant::ChainParameters;
 use crate::reality::real_chain;
-use crate::rig::{PerJoint, Rig};
+use crate::rig::{FrictionLaw, PerJoint, Rig};
 
 /// Friction is drawn between the usual value divided by this factor and multiplied by it.
 const FRICTION_FACTOR: f64 = 3.0;
@@ -22,6 +22,30 @@ const LATENCY_TICKS: f64 = 0.95;
 /// Largest relative error of the motor's dead zone.
 const DEAD_ZONE: f64 = 0.5;
 
+/// What is drawn for other laws of friction: excess at rest (%), speed of the cart (m/s) and rate of a joint (rad/s) at
+/// which half of it is left, the same for a contact that never sticks, and the factor within which these speeds and the
+/// presliding of the file are drawn.
+const EXCESS_PERCENT: [f64; 2] = [20.0, 60.0];
+const STRIBECK: [f64; 2] = [0.01, 0.1];
+const CREEPING: [f64; 2] = [0.004, 0.02];
+const LAW_FACTOR: f64 = 2.0;
+
+/// The law of the dry friction of drawn machines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TrueFriction {
+    /// The elasto-plastic bristle of `[reality]`.
+    #[default]
+    OfFile,
+    /// The same, larger at rest than in motion.
+    Stribeck,
+    /// Coulomb friction times the tanh of the speed.
+    Tanh,
+    /// Dahl's bristle.
+    Dahl,
+    /// Dahl's bristle, larger at rest than in motion.
+    LuGre,
+}
+
 /// A simulated machine, and the true value of each parameter that is identified.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnMachine {
@@ -32,11 +56,18 @@ pub struct DrawnMachine {
 
 impl DrawnMachine {
     /// Draws machine `number` of those that differ from `file` by up to `off_percent` in masses, lengths and inertias.
-    /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's.
+    /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's. The
+    /// true dry friction is that at high speed.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders.
-    pub fn draw(file: &Rig, off_percent: f64, seed: u64, number: u64) -> Result<Self, IdentifyError> {
+    pub fn draw(
+        file: &Rig,
+        off_percent: f64,
+        law: TrueFriction,
+        seed: u64,
+        number: u64,
+    ) -> Result<Self, IdentifyError> {
         let chain = chain_of(file)?;
         // Each machine has its own generator, so that it does not depend on the others.
         let mut random = Pcg64::seed_from_u64(seed.rotate_left(32) ^ number);
@@ -72,13 +103,52 @@ impl DrawnMachine {
             motor.dead_zone_v *= 1.0 + within(DEAD_ZONE);
         }
         rig.reality.driver.latency_s = 0.5 * (LATENCY_TICKS + within(LATENCY_TICKS)) * rig.tick.period_s;
-        let truth = truth(&rig)?;
+        let mut random_in = |low: f64, high: f64| random.random_range(low..=high);
+        draw_law(&mut rig, law, &mut random_in);
+        let mut truth = truth(&rig)?;
+        if file.actuator.acceleration.is_some() {
+            // Pulses begin in their tick, and are felt by the links alone, as ratios to the last first moment.
+            rig.reality.driver = file.reality.driver.clone();
+            let of_file = priors[layout.first_moment(links - 1)].value;
+            let of_machine = truth.iter().find(|(kind, _)| *kind == ParameterKind::FirstMoment(links - 1));
+            let ratio = of_machine.map_or(1.0, |(_, moment)| of_file / moment);
+            truth.iter_mut().filter(|(kind, _)| kind.is_of_masses()).for_each(|(_, value)| *value *= ratio);
+        }
         Ok(Self { rig, truth })
     }
 
     /// The true value of a parameter, if the machine has it.
     pub fn truth(&self, kind: ParameterKind) -> Option<f64> {
         self.truth.iter().find(|(known, _)| *known == kind).map(|(_, value)| *value)
+    }
+}
+
+/// Draws the numbers of another `law` of friction into `rig`; `random` gives a number between two.
+fn draw_law(rig: &mut Rig, law: TrueFriction, random: &mut dyn FnMut(f64, f64) -> f64) {
+    let mut factor = || libm::pow(LAW_FACTOR, random(-1.0, 1.0));
+    let factors = [factor(), factor(), factor(), factor()];
+    let links = rig.chain().map_or(0, |chain| chain.links.len());
+    let reality = &mut rig.reality;
+    let friction = &mut reality.friction;
+    let speeds = match law {
+        TrueFriction::OfFile | TrueFriction::Dahl => None,
+        TrueFriction::Stribeck | TrueFriction::LuGre => {
+            friction.breakaway_percent = random(EXCESS_PERCENT[0], EXCESS_PERCENT[1]);
+            Some(STRIBECK)
+        }
+        TrueFriction::Tanh => {
+            reality.friction_law = FrictionLaw::Creeping;
+            Some(CREEPING)
+        }
+    };
+    if let Some([cart, joint]) = speeds {
+        (friction.stribeck_m_per_s, friction.stribeck_rad_per_s) = (factors[0] * cart, factors[1] * joint);
+    }
+    if let TrueFriction::Dahl | TrueFriction::LuGre = law {
+        reality.friction_law = FrictionLaw::Dahl;
+        friction.presliding_m *= factors[2];
+        let joints = (0..links).map(|joint| factors[3] * friction.presliding_rad.of(joint));
+        friction.presliding_rad = PerJoint::each(joints.collect());
     }
 }
 
@@ -102,6 +172,7 @@ fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
         ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
         ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j)),
         ParameterKind::Presliding(_)
+        | ParameterKind::Travel
         | ParameterKind::EccentricSine(_)
         | ParameterKind::EccentricCosine(_) => None,
     };

@@ -16,6 +16,7 @@
 //! 2. Multiple shooting: in windows of 0.25 s, each with its own initial state, parameters and initial states are
 //!    fitted by the Levenberg–Marquardt method. The dry friction of the cart is a bristle (Dahl's model), so that the
 //!    cart sticks for a moment when it reverses; that of the joints is `c tanh(ω/ε)`.
+//!    A cart that never sticks has a tanh, too, if the log shows it.
 //! 3. Prediction error: an extended Kalman filter predicts each measurement from the earlier ones. Its noise
 //!    intensities and the smoothing of the friction are chosen by maximum likelihood; the parameters minimise the
 //!    squared innovations divided by their variances (Gauss–Newton).
@@ -26,10 +27,12 @@
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
 mod at_rest;
+mod cart_force;
 mod channel;
 mod convert;
 mod covariance;
 mod coverage;
+mod creeping;
 #[cfg(test)]
 mod decay;
 mod doubt;
@@ -39,6 +42,7 @@ mod estimated;
 mod excite;
 mod feed;
 mod free;
+mod imposed;
 mod log;
 mod machines;
 mod model;
@@ -57,6 +61,7 @@ mod shooting;
 mod step;
 mod stribeck;
 mod table;
+mod travel;
 mod verdict;
 mod window_errors;
 mod wiring;
@@ -72,10 +77,10 @@ pub use estimated::{Estimate, Identification};
 pub use excite::{Excitation, shake};
 pub use feed::Feed;
 pub use log::{CONTACTS, DriveScale, Log, LogHeader, Tick};
-pub use machines::DrawnMachine;
+pub use machines::{DrawnMachine, TrueFriction};
 pub use over_line::{LineError, OverLine};
 pub use parameters::ParameterKind;
-pub use realise::{Realised, RealisedLink};
+pub use realise::{Realised, RealisedCart, RealisedLink};
 pub use recorder::Recorder;
 pub use recordings::Recordings;
 pub use table::{AngleReference, AngleZero, Reading, RecordingError, RecordingTable};

@@ -3,6 +3,7 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
+use super::cart_force::CartForce;
 use super::parameters::Layout;
 use super::rows::add_multiple;
 use super::stribeck;
@@ -25,35 +26,28 @@ use super::stribeck;
 ///
 /// with ζ_i of the joint instead of the tanh if it has a bristle, δ_i long. If the friction at rest is larger than in
 /// motion, c_0 and c_i have a factor ([`stribeck::factor`]). Here
-/// e is the damping by the motor's back-EMF, and q_j the air drag of link j. A cart that is clamped has ẍ = 0
-/// instead of the first equation. A cart that reverses is held by its friction until the bristle has
-/// reversed, too (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976); with a
-/// friction model without memory it would creep instead.
+/// e is the damping by the motor's back-EMF, and q_j the air drag of link j. If the motion of the cart is imposed,
+/// ẍ is given instead of the first equation; it is 0 for a cart that is clamped. A cart that reverses is held by its
+/// friction until the bristle has reversed, too (P. R. Dahl, "Solid friction damping of mechanical
+/// vibrations", AIAA Journal 14(12), 1976); with a friction model without memory it would creep instead.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) layout: Layout,
     pub(super) gravity: f64,
     /// δ of the cart (m) and ε of the joints (rad/s).
     pub(super) smoothing: [f64; 2],
+    /// Speed v (m/s) above which the dry friction of the cart is about constant, if it has no bristle: it is then
+    /// `c_0 tanh(ẋ/v)`.
+    pub(super) creeping: Option<f64>,
     /// Excess of the friction at rest of the cart and of the joints, as a share of the friction in motion; not of
     /// joints that have a bristle.
     pub(super) excess: [f64; 2],
-    /// Whether the cart cannot move.
-    pub(super) is_clamped: bool,
+    /// Whether the cart's motion is imposed, by a drive or by a clamp.
+    pub(super) is_imposed: bool,
+    /// Parts of an integration step.
+    pub(super) substeps: usize,
     /// Whether the friction of each joint has a bristle, as that of the cart has.
     pub(super) has_bristles: bool,
-}
-
-/// Force on the cart in a step (N), and its derivatives.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct CartForce {
-    pub(super) force: f64,
-    /// Derivative by the delay (N/tick).
-    pub(super) by_delay: f64,
-    /// Derivative by the dead zone (N/V).
-    pub(super) by_dead_zone: f64,
-    /// e: back-EMF as damping (N·s/m); 0 while the motor turns freely.
-    pub(super) back_emf: f64,
 }
 
 /// Accelerations at one state, and their derivatives.
@@ -101,9 +95,14 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Factor of the dry friction of the cart at the speed `v` (m/s), and its derivative.
-    fn cart_factor(&self, v: f64) -> [f64; 2] {
-        stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v)
+    /// Dry friction of the cart at the speed `v` (m/s) with the deflection `bristle`, as a share of that in motion, and
+    /// its derivatives by speed and deflection.
+    fn cart_friction(&self, v: f64, bristle: f64) -> [f64; 3] {
+        let [factor, by_speed] = stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v);
+        let Some(creeping) = self.creeping else { return [factor * bristle, by_speed * bristle, factor] };
+        let direction = libm::tanh(v / creeping);
+        let slope = (1.0 - direction * direction) / creeping;
+        [factor * direction, by_speed * direction + factor * slope, 0.0]
     }
 
     /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
@@ -150,7 +149,7 @@ impl Accelerations {
         self.factors[0] = total;
         right[0] = input.force
             - (p[layout.viscous(0)] + input.back_emf) * v
-            - p[layout.dry(0)] * model.cart_factor(v)[0] * bristle
+            - p[layout.dry(0)] * model.cart_friction(v, bristle)[0]
             - model.gravity * total * slope_sine;
         let mut below = 0.0;
         for j in 0..n {
@@ -172,9 +171,11 @@ impl Accelerations {
                 right[j] += friction;
             }
         }
-        if model.is_clamped {
-            (self.factors[0], right[0]) = (1.0, 0.0);
-            (1..m).for_each(|row| self.factors[row * m] = 0.0);
+        if model.is_imposed {
+            (self.factors[0], right[0]) = (1.0, input.force);
+            for row in 1..m {
+                right[row] -= core::mem::take(&mut self.factors[row * m]) * input.force;
+            }
         }
         factorise(&mut self.factors, m);
         solve(&self.factors, m, 1, &mut self.acceleration);
@@ -188,8 +189,11 @@ impl Accelerations {
         if self.columns > model.states() {
             self.by_parameters(model, p, at, input);
         }
-        if model.is_clamped {
+        if model.is_imposed {
             self.jacobian[..self.columns].fill(0.0);
+            if self.columns > model.states() {
+                self.by_travel(model, p, input);
+            }
         }
         solve(&self.factors, model.coordinates(), self.columns, &mut self.jacobian);
     }
@@ -201,9 +205,9 @@ impl Accelerations {
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
-        let [factor, by_speed] = model.cart_factor(at[m]);
-        by[m] -= input.back_emf + p[layout.viscous(0)] + p[layout.dry(0)] * by_speed * at[2 * m];
-        by[2 * m] -= p[layout.dry(0)] * factor;
+        let [_, by_speed, by_bristle] = model.cart_friction(at[m], at[2 * m]);
+        by[m] -= input.back_emf + p[layout.viscous(0)] + p[layout.dry(0)] * by_speed;
+        by[2 * m] -= p[layout.dry(0)] * by_bristle;
         let mut below = 0.0;
         for j in 0..n {
             let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
@@ -247,7 +251,7 @@ impl Accelerations {
         let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
         by[s + Layout::TOTAL_MASS] -= xdd + gravity * slope_sine;
         by[s + layout.viscous(0)] -= v;
-        by[s + layout.dry(0)] -= model.cart_factor(v)[0] * at[2 * m];
+        by[s + layout.dry(0)] -= model.cart_friction(v, at[2 * m])[0];
         by[s + layout.tilt()] -= gravity * p[Layout::TOTAL_MASS] * slope_cosine;
         by[s + layout.delay()] += input.by_delay;
         by[s + layout.dead_zone()] += input.by_dead_zone;
@@ -282,6 +286,17 @@ impl Accelerations {
                 by[row - columns + layout.viscous(j + 1)] += rate;
                 by[row - columns + layout.dry(j + 1)] += direction;
             }
+        }
+    }
+
+    /// `-∂r` by the travel per step, to which an imposed acceleration is proportional.
+    fn by_travel(&mut self, model: &Model, p: &[f64], input: &CartForce) {
+        let (column, share) =
+            (model.states() + model.layout.travel(), input.force / p[model.layout.travel()]);
+        self.jacobian[column] = share;
+        for (link, cosine) in self.cosine.iter().enumerate().take(model.layout.links) {
+            self.jacobian[(link + 1) * self.columns + column] =
+                p[model.layout.first_moment(link)] * cosine * share;
         }
     }
 
@@ -357,8 +372,10 @@ pub(super) mod tests {
             layout: Layout { links: 3 },
             gravity: chain.gravity_m_per_s2,
             smoothing: SMOOTHING,
+            creeping: None,
             excess: [0.3, 0.2],
-            is_clamped: false,
+            is_imposed: false,
+            substeps: 1,
             has_bristles: false,
         };
         let mut p: Vec<f64> = priors(&rig, chain, true).iter().map(|prior| prior.value).collect();
@@ -385,20 +402,21 @@ pub(super) mod tests {
 
     #[test]
     fn derivatives_agree_with_differences() {
-        derivatives_agree(false);
-        derivatives_agree(true);
+        derivatives_agree(false, false);
+        derivatives_agree(true, false);
+        derivatives_agree(false, true);
     }
 
-    fn derivatives_agree(has_bristles: bool) {
+    fn derivatives_agree(has_bristles: bool, is_imposed: bool) {
         let (mut model, mut p, _) = triple();
-        model.has_bristles = has_bristles;
+        (model.has_bristles, model.is_imposed) = (has_bristles, is_imposed);
         p[model.layout.tilt()] = 0.1;
         let mut exact = Accelerations::new(&model, true);
         exact.differentiate(
             &model,
             &p,
             &AT,
-            &CartForce { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7 },
+            &CartForce { force: 17.0, by_delay: 2.0, by_dead_zone: -3.0, back_emf: 0.7, jump: 0.0 },
         );
         let states = model.states();
         let columns = states + model.layout.of_motion();
@@ -413,6 +431,8 @@ pub(super) mod tests {
                 let step = if column < states { 1e-6 } else { 1e-6 * p[column - states].abs().max(1e-2) };
                 match column.checked_sub(states) {
                     None => state[column] += sign * step,
+                    Some(index) if is_imposed && index == model.layout.travel() => force *= 1.0 + sign * step,
+                    Some(index) if is_imposed && index >= model.layout.delay() => {}
                     Some(index) if index == model.layout.delay() => force += sign * step * 2.0,
                     Some(index) if index == model.layout.dead_zone() => force -= sign * step * 3.0,
                     Some(index) => p[index] += sign * step,

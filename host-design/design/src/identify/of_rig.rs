@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log};
+use crate::number::significant;
 use crate::rig::Rig;
 
 /// Checks that a log was recorded on the rig.
@@ -34,16 +35,69 @@ pub(super) fn is_of(rig: &Rig, log: &Log, file: &Path) -> Result<(), IdentifyErr
             "correct period_s in [tick], or record again",
         );
     }
-    let has_motor = rig.actuator.motor.is_some();
-    if has_motor != (header.drive == DriveScale::Duty) {
-        let names = ["a machine that commands forces", "a machine that commands duties"];
-        let (found, wanted) =
-            (names[usize::from(!has_motor)], ["without a motor", "with a motor"][usize::from(has_motor)]);
+    let [found, wanted] = [DriveKind::of_log(header.drive), DriveKind::of_rig(rig)];
+    if found != wanted {
         return other(
-            found.to_owned(),
-            wanted.to_owned(),
+            format!("a machine that commands {}", found.commands()),
+            found.wanted(wanted).to_owned(),
             "describe the motor in [actuator] as when it was recorded",
         );
     }
+    if let (DriveScale::Steps(step_m), Some(drive)) = (header.drive, &rig.actuator.acceleration)
+        && (step_m / drive.step_m - 1.0).abs() > SAME_STEP
+    {
+        return other(
+            format!("a drive with {} µm per pulse", significant(1e6 * step_m, 6)),
+            format!("for {} µm", significant(1e6 * drive.step_m, 6)),
+            "correct step_m in [actuator], or record again",
+        );
+    }
     Ok(())
+}
+
+/// Largest relative difference of two travels per pulse that are the same.
+const SAME_STEP: f64 = 1e-6;
+
+/// What a drive is commanded.
+#[derive(Clone, Copy, PartialEq)]
+enum DriveKind {
+    Duty,
+    Force,
+    Pulses,
+}
+
+impl DriveKind {
+    fn of_log(scale: DriveScale) -> Self {
+        match scale {
+            DriveScale::Duty => Self::Duty,
+            DriveScale::Force(_) => Self::Force,
+            DriveScale::Steps(_) => Self::Pulses,
+        }
+    }
+
+    fn of_rig(rig: &Rig) -> Self {
+        match (&rig.actuator.acceleration, &rig.actuator.motor) {
+            (Some(_), _) => Self::Pulses,
+            (None, Some(_)) => Self::Duty,
+            (None, None) => Self::Force,
+        }
+    }
+
+    fn commands(self) -> &'static str {
+        match self {
+            Self::Duty => "duties",
+            Self::Force => "forces",
+            Self::Pulses => "pulses",
+        }
+    }
+
+    /// How a rig file with this drive differs from one with `other`.
+    fn wanted(self, other: Self) -> &'static str {
+        match other {
+            Self::Duty => "with a motor",
+            Self::Force if self == Self::Duty => "without a motor",
+            Self::Force => "with kind = \"force\"",
+            Self::Pulses => "with kind = \"acceleration\"",
+        }
+    }
 }

@@ -37,6 +37,8 @@ pub enum ParameterKind {
     Delay,
     /// Dead zone of the motor (V).
     DeadZone,
+    /// Travel per step of a drive that imposes the cart's motion, as a multiple of that of the file.
+    Travel,
     /// Zero error of a joint's encoder (rad).
     Zero(usize),
     /// Amplitude of the part of an eccentric encoder's error that follows the sine of the angle (rad).
@@ -49,6 +51,18 @@ impl ParameterKind {
     /// What the parameter is multiplied by to give the value of the rig file.
     pub(super) fn of_file(self) -> f64 {
         if let ParameterKind::Presliding(_) = self { PRESLIDING_PER_DEFLECTION } else { 1.0 }
+    }
+
+    /// Whether a common factor of all masses and frictions of the links multiplies the parameter.
+    pub(super) fn is_of_masses(self) -> bool {
+        matches!(
+            self,
+            ParameterKind::FirstMoment(_)
+                | ParameterKind::SecondMoment(_)
+                | ParameterKind::JointViscous(_)
+                | ParameterKind::JointDry(_)
+                | ParameterKind::AirDrag(_)
+        )
     }
 
     /// Name, with links and joints counted from 1, and SI unit.
@@ -68,6 +82,7 @@ impl ParameterKind {
             ParameterKind::Tilt => ("tilt of the rail".to_owned(), "rad"),
             ParameterKind::Delay => ("delay".to_owned(), "ticks"),
             ParameterKind::DeadZone => ("dead zone".to_owned(), "V"),
+            ParameterKind::Travel => ("travel per step".to_owned(), "of step_m"),
             ParameterKind::Zero(j) => (of("zero, joint", j), "rad"),
             ParameterKind::EccentricSine(j) => (of("eccentricity (sine), joint", j), "rad"),
             ParameterKind::EccentricCosine(j) => (of("eccentricity (cosine), joint", j), "rad"),
@@ -114,14 +129,17 @@ impl Layout {
     pub(super) fn dead_zone(self) -> usize {
         7 * self.links + 4
     }
+    pub(super) fn travel(self) -> usize {
+        7 * self.links + 5
+    }
     pub(super) fn zero(self, joint: usize) -> usize {
-        7 * self.links + 5 + joint
+        7 * self.links + 6 + joint
     }
     pub(super) fn sine(self, joint: usize) -> usize {
-        8 * self.links + 5 + joint
+        8 * self.links + 6 + joint
     }
     pub(super) fn cosine(self, joint: usize) -> usize {
-        9 * self.links + 5 + joint
+        9 * self.links + 6 + joint
     }
     /// Whether a parameter is the friction of a joint or the drag of a link.
     pub(super) fn is_dissipative(self, index: usize) -> bool {
@@ -129,10 +147,10 @@ impl Layout {
     }
     /// Number of parameters on which the motion depends: they come first; the others belong to the encoders.
     pub(super) fn of_motion(self) -> usize {
-        7 * self.links + 5
+        7 * self.links + 6
     }
     pub(super) fn count(self) -> usize {
-        10 * self.links + 5
+        10 * self.links + 6
     }
 
     /// What each parameter is, in order.
@@ -148,7 +166,12 @@ impl Layout {
         kinds.extend((0..n).map(ParameterKind::JointDry));
         kinds.extend((0..n).map(ParameterKind::AirDrag));
         kinds.extend((0..n).map(ParameterKind::Presliding));
-        kinds.extend([ParameterKind::Tilt, ParameterKind::Delay, ParameterKind::DeadZone]);
+        kinds.extend([
+            ParameterKind::Tilt,
+            ParameterKind::Delay,
+            ParameterKind::DeadZone,
+            ParameterKind::Travel,
+        ]);
         kinds.extend((0..n).map(ParameterKind::Zero));
         kinds.extend((0..n).map(ParameterKind::EccentricSine));
         kinds.extend((0..n).map(ParameterKind::EccentricCosine));
@@ -229,6 +252,7 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
             value: motor.dead_zone_v,
             deviation: motor.dead_zone_v.max(0.02 * motor.supply_v),
         }),
+        ParameterKind::Travel => Prior { value: 1.0, deviation: 0.0 },
         ParameterKind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
         ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => {
             Prior { value: 0.0, deviation: if eccentricity { ECCENTRICITY_RAD } else { 0.0 } }

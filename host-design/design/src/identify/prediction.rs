@@ -3,7 +3,8 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::model::{CartForce, Model};
+use super::cart_force::CartForce;
+use super::model::Model;
 use super::normal::Normal;
 use super::parameters::{Layout, Prior, room_below};
 use super::record::Record;
@@ -81,7 +82,7 @@ impl Filter<'_> {
         let mut noise = usual_noise(p, self.model.layout, self.model.gravity);
         let mut least = filter.run(p, &noise, false).cost;
         for factor in FACTORS {
-            for channel in 0..noise.len() {
+            for channel in self.record.first_channel()..noise.len() {
                 for factor in [factor, 1.0 / factor] {
                     for _ in 0..6 {
                         let mut other = noise.clone();
@@ -176,7 +177,7 @@ impl Filter<'_> {
         let settled = first + (SETTLING_S / dt_s) as usize;
         let mut jacobian = vec![0.0; size];
         for sample in first..first + samples {
-            for channel in 0..m {
+            for channel in self.record.first_channel()..m {
                 let measured = y[sample * m + channel];
                 let (error, predicted) = filter.correct(self, p, channel, measured, &mut jacobian);
                 if sample >= settled {

@@ -3,17 +3,13 @@
 use super::error::IdentifyError;
 use super::parameters::Layout;
 use crate::reality::PRESLIDING_PER_DEFLECTION;
-use crate::rig::Chain;
+use crate::rig::{CartInput, Chain};
 
 /// The numbers of a rig file that an identification changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Realised {
-    /// Mass of the cart (kg).
-    pub cart_kg: f64,
-    /// Viscous friction of the cart (N·s/m).
-    pub cart_viscous: f64,
-    /// Dry friction of the cart (N).
-    pub cart_dry_n: f64,
+    /// The cart; none if its drive imposes its motion, whatever its mass and friction are.
+    pub cart: Option<RealisedCart>,
     /// The links, in their order from the cart.
     pub links: Vec<RealisedLink>,
     /// Slope of the rail (rad).
@@ -22,6 +18,17 @@ pub struct Realised {
     pub dead_zone_v: f64,
     /// Factor on the winding resistance: 1, unless a weighing has fixed the scale of the force.
     pub resistance_factor: f64,
+}
+
+/// The numbers of the cart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RealisedCart {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Viscous friction (N·s/m).
+    pub viscous: f64,
+    /// Dry friction (N).
+    pub dry_n: f64,
 }
 
 /// The numbers of a link and of the joint at its lower end.
@@ -113,22 +120,30 @@ fn with_masses(
         outer += mass_kg;
     }
     links.reverse();
-    let cart_kg = scale * p[Layout::TOTAL_MASS] - outer;
-    if cart_kg <= 0.0 {
-        return Err(IdentifyError::Physical(
-            "the cart would have no mass: the links of the file are too heavy, or the force is smaller than the file says"
-                .to_owned(),
-        ));
-    }
     Ok(Realised {
-        cart_kg,
-        cart_viscous: (scale * p[layout.viscous(0)]).max(0.0),
-        cart_dry_n: (scale * p[layout.dry(0)]).max(0.0),
+        cart: cart(chain, p, scale, outer)?,
         links,
         tilt_rad: p[layout.tilt()],
         dead_zone_v: p[layout.dead_zone()].max(0.0),
         resistance_factor: 1.0 / scale,
     })
+}
+
+/// The cart under links of `links_kg`; none if its drive imposes its motion.
+fn cart(chain: &Chain, p: &[f64], scale: f64, links_kg: f64) -> Result<Option<RealisedCart>, IdentifyError> {
+    if chain.input == CartInput::Acceleration {
+        return Ok(None);
+    }
+    let layout = Layout { links: chain.links.len() };
+    let mass_kg = scale * p[Layout::TOTAL_MASS] - links_kg;
+    if mass_kg <= 0.0 {
+        return Err(IdentifyError::Physical(
+            "the cart would have no mass: the links of the file are too heavy, or the force is smaller than the file says"
+                .to_owned(),
+        ));
+    }
+    let [viscous, dry_n] = [layout.viscous(0), layout.dry(0)].map(|index| (scale * p[index]).max(0.0));
+    Ok(Some(RealisedCart { mass_kg, viscous, dry_n }))
 }
 
 #[cfg(test)]
@@ -156,7 +171,7 @@ mod tests {
             }
             let found = realise(&chain, &p, None).unwrap();
             let mut other = chain.clone();
-            other.cart.mass_kg = Some(found.cart_kg);
+            other.cart.mass_kg = found.cart.map(|cart| cart.mass_kg);
             for (link, found) in other.links.iter_mut().zip(&found.links) {
                 (link.mass_kg, link.length_m) = (found.mass_kg, found.length_m);
                 (link.centre_of_mass_m, link.inertia_kg_m2) =
@@ -196,7 +211,7 @@ mod tests {
         let (chain, p) = chain_and_values("double-quanser-dbpen.toml");
         let moment = p[Layout { links: 2 }.first_moment(1)];
         let found = realise(&chain, &p, Some(1.1 * moment)).unwrap();
-        let total = found.cart_kg + found.links.iter().map(|link| link.mass_kg).sum::<f64>();
+        let total = found.cart.unwrap().mass_kg + found.links.iter().map(|link| link.mass_kg).sum::<f64>();
         assert!((total / p[0] - 1.1).abs() < 1e-12 && (found.resistance_factor * 1.1 - 1.0).abs() < 1e-12);
     }
 

@@ -7,10 +7,12 @@ use core::f64::consts::PI;
 
 use upright::protocol::tick_log::OFF;
 
+use super::cart_force::CartForce;
 use super::channel::channel_name;
 use super::error::IdentifyError;
+use super::imposed;
 use super::log::{DriveScale, Log};
-use super::model::{CartForce, Model};
+use super::model::Model;
 use super::parameters::Layout;
 use super::table::RecordingRows;
 use crate::rig::{Motor, Rig};
@@ -25,8 +27,9 @@ const SHORTEST_PIECE_S: f64 = 1.0;
 pub(super) struct Piece {
     /// Deviations from hanging (m, rad), one row of m channels per sample.
     pub(super) y: Vec<f64>,
-    /// Voltage (V), or force (N) of a rig without a motor, in each tick; none while the motor is off.
-    drive: Vec<Option<f64>>,
+    /// Voltage (V), or force (N) of a rig without a motor, in each tick; none while the motor is off. Of a drive that
+    /// imposes the cart's motion, its position at the beginning of the tick (m).
+    pub(super) drive: Vec<Option<f64>>,
 }
 
 /// The samples of all logs.
@@ -44,6 +47,8 @@ pub(super) struct Record {
     delay_ticks: usize,
     /// Whether the cart cannot move; its channel is then 0.
     pub(super) is_clamped: bool,
+    /// Whether the drive imposes the cart's motion: its channel is the input.
+    pub(super) is_moved: bool,
 }
 
 impl Record {
@@ -68,6 +73,7 @@ impl Record {
             motor: rig.actuator.motor.clone(),
             delay_ticks: usize::from(rig.tick.delay_ticks),
             is_clamped: false,
+            is_moved: rig.actuator.acceleration.is_some(),
             steps,
         }
     }
@@ -77,13 +83,17 @@ impl Record {
         let period_s = pieces.first().map_or(rig.tick.period_s, |rows| rows.period_s);
         let mut record = Self::empty(rig, period_s, Self::usual_stride(period_s));
         record.is_clamped = is_clamped;
+        record.is_moved &= !is_clamped;
         if is_force {
             record.motor = None;
         }
         let (stride, channels) = (record.stride, record.channels);
         for rows in pieces.into_iter().filter(|rows| rows.drive.len() as f64 * period_s >= SHORTEST_PIECE_S) {
             let y = rows.y.chunks(channels).step_by(stride).flatten().copied().collect();
-            record.pieces.push(Piece { y, drive: rows.drive });
+            let position = |row: &[f64]| row.first().copied();
+            let drive =
+                if record.is_moved { rows.y.chunks(channels).map(position).collect() } else { rows.drive };
+            record.pieces.push(Piece { y, drive });
         }
         record
     }
@@ -106,15 +116,21 @@ impl Record {
         let drive = |index: usize| {
             let tick = &ticks[index];
             let drive = match log.header.drive {
+                DriveScale::Steps(_) => deviations[index * self.channels] as f64 * self.steps[0],
                 DriveScale::Force(_) => log.drive(tick),
                 DriveScale::Duty if tick.supply_mv == 0 => log.drive(tick) * supply,
                 DriveScale::Duty => log.drive(tick) * f64::from(tick.supply_mv) * 1e-3,
             };
             (tick.drive != OFF).then_some(drive)
         };
-        let mut from = 0;
+        let (mut from, is_moved) = (0, self.is_moved);
         for to in 1..=ticks.len() {
-            if to < ticks.len() && ticks[to].number == ticks[to - 1].number + 1 {
+            // A drive that is off lets go of the cart, and its pulses no longer tell where that is.
+            let goes_on = |to: usize| {
+                ticks[to].number == ticks[to - 1].number + 1
+                    && !(is_moved && (ticks[to].drive == OFF || ticks[to - 1].drive == OFF))
+            };
+            if to < ticks.len() && goes_on(to) {
                 continue;
             }
             if (to - from) as f64 * rig.tick.period_s >= SHORTEST_PIECE_S {
@@ -158,13 +174,23 @@ impl Record {
         part
     }
 
-    /// A copy with `change` applied to each row of measurements.
+    /// A copy with `change` applied to each row of measurements, and to the path of a cart whose motion is imposed.
     pub(super) fn rewired(&self, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         let mut record = self.clone();
+        let mut row = vec![0.0; self.channels];
         for piece in &mut record.pieces {
             piece.y = piece.y.chunks(self.channels).flat_map(&change).collect();
+            for position in piece.drive.iter_mut().flatten().filter(|_| self.is_moved) {
+                row[0] = *position;
+                *position = change(&row)[0];
+            }
         }
         record
+    }
+
+    /// The first channel whose measurements the model has to explain: not the cart's, if its motion is known.
+    pub(super) fn first_channel(&self) -> usize {
+        usize::from(self.is_clamped || self.is_moved)
     }
 
     /// A copy with the motor reversed.
@@ -182,6 +208,9 @@ impl Record {
     /// Force of each interval between two samples of a piece, with the delay and the dead zone of `p`:
     /// `u = (1 - δ) u_k + δ u_{k-1}`, averaged over the interval.
     pub(super) fn inputs(&self, layout: Layout, p: &[f64], piece: usize) -> Vec<CartForce> {
+        if self.is_moved {
+            return imposed::inputs(&self.pieces[piece].drive, self.stride, self.dt_s, p[layout.travel()]);
+        }
         let (delay, dead_zone) = (p[layout.delay()], p[layout.dead_zone()]);
         let drive = &self.pieces[piece].drive;
         let force = |tick: Option<usize>| {
@@ -316,8 +345,11 @@ impl Record {
             layout: Layout { links: self.channels - 1 },
             gravity,
             smoothing: super::parameters::SMOOTHING,
+            creeping: None,
             excess: [0.0; 2],
-            is_clamped: self.is_clamped,
+            is_imposed: self.is_clamped || self.is_moved,
+            // Pulses may come in slow ticks, which are smooth steps only for a force.
+            substeps: if self.is_moved { (self.dt_s / LONGEST_S).ceil() as usize } else { 1 },
             has_bristles: false,
         }
     }

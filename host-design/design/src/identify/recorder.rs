@@ -20,9 +20,10 @@ impl Recorder {
     /// A recorder with an empty log, for a rig and its gain table.
     pub fn new(rig: &Rig, table: &TableValues) -> Self {
         let sensors = table.sensors();
-        let drive = match table.motor {
-            Some(_) => DriveScale::Duty,
-            None => DriveScale::Force(table.force_limit_n.into()),
+        let drive = match (&rig.actuator.acceleration, table.motor) {
+            (Some(drive), _) => DriveScale::Steps(drive.step_m),
+            (None, Some(_)) => DriveScale::Duty,
+            (None, None) => DriveScale::Force(table.force_limit_n.into()),
         };
         let log = Log::new(LogHeader {
             rig: rig.name.clone(),

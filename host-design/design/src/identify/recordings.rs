@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::channel::chain_of;
 use super::error::IdentifyError;
+use super::imposed;
 use super::log::Log;
 use super::of_rig::is_of;
 use super::record::Record;
@@ -63,6 +64,7 @@ impl Recordings {
         match self {
             Recordings::Logs(logs) => {
                 logs.iter().try_for_each(|(file, log)| is_of(rig, log, file))?;
+                logs.iter().try_for_each(|(file, log)| imposed::counts_its_pulses(log, file))?;
                 let lost_ticks = logs.iter().map(|(_, log)| log.lost()).sum();
                 let logs: Vec<Log> = logs.iter().map(|(_, log)| log.clone()).collect();
                 let stride = Record::usual_stride(rig.tick.period_s);
@@ -106,7 +108,8 @@ fn of_tables(
                 remedy: "identify recordings with different periods one by one".to_owned(),
             }));
         }
-        (is_driven, is_force) = (columns.is_driven(), columns.is_force);
+        let is_moved = rig.actuator.acceleration.is_some() && !reading.is_clamped;
+        (is_driven, is_force) = (columns.is_driven() || is_moved, columns.is_force);
         rows.extend(pieces);
     }
     let record = Record::of_rows(rig, rows, is_force, reading.is_clamped);

@@ -3,7 +3,8 @@
 // The indices are those of the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::model::{CartForce, Model};
+use super::cart_force::CartForce;
+use super::model::Model;
 use super::normal::{Cholesky, Normal};
 use super::parameters::{Prior, room_below};
 use super::record::Record;

@@ -20,6 +20,8 @@ const OF_SENSOR: f64 = 3.0;
 pub struct ChannelFit {
     /// The cart, or a joint from 1.
     pub name: String,
+    /// Number of the channel: 0 for the cart, then the joints.
+    pub channel: usize,
     /// Variance of the innovations, divided by what the filter expects: 1 if the model is right.
     pub innovation_variance: f64,
     /// Prediction error (rms) over held-out windows of 0.5 s, with the old file and with the new numbers (m, rad).
@@ -133,18 +135,20 @@ pub(super) struct HeldOut {
     pub(super) predictions: Vec<Vec<Predicted>>,
 }
 
-/// The channels, with their names; `over` are the innovations of the whole log, `ranges` how far each channel moved.
-pub(super) fn channels(over: &Normal, held: HeldOut, ranges: &[f64]) -> Vec<ChannelFit> {
-    let count = ranges.len();
+/// The channels from `first`, with their names; `over` are the innovations of the whole log, `ranges` how far each
+/// channel moved.
+pub(super) fn channels(over: &Normal, held: HeldOut, ranges: &[f64], first: usize) -> Vec<ChannelFit> {
+    let count = ranges.len() - first;
     let one = |(channel, predictions): (usize, Vec<Predicted>)| ChannelFit {
         name: channel_name(channel),
+        channel,
         innovation_variance: over.normalised[channel] / over.count.max(1) as f64,
         held_out: [held.rms[0][channel], held.rms[1][channel]],
         range: ranges[channel],
         predictions,
-        innovations: over.innovations.iter().skip(channel).step_by(count).copied().collect(),
+        innovations: over.innovations.iter().skip(channel - first).step_by(count).copied().collect(),
     };
-    held.predictions.into_iter().enumerate().map(one).collect()
+    held.predictions.into_iter().enumerate().skip(first).map(one).collect()
 }
 
 impl From<IdentifyError> for Refusal {

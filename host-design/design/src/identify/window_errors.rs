@@ -16,7 +16,7 @@ const ITERATIONS: (usize, usize) = (10, 3);
 pub struct WindowErrors {
     /// Length of the windows (s).
     pub window_s: f64,
-    /// The channels that move: the cart, unless it is clamped, and the joints.
+    /// The channels that move: the cart, unless its motion is known, and the joints.
     pub channels: Vec<ChannelError>,
 }
 
@@ -76,5 +76,6 @@ fn over(model: &Model, priors: &[Prior], records: &[Predicting<'_>], window_s: f
         sensor_error: records.iter().map(|(record, _)| record.sensor_error(channel)).fold(0.0, f64::max),
         errors: squares[channel].map(|sum| (sum / count.max(1) as f64).sqrt()),
     };
-    WindowErrors { window_s, channels: (usize::from(model.is_clamped)..channels).map(error).collect() }
+    let first = records.iter().map(|(record, _)| record.first_channel()).max().unwrap_or_default();
+    WindowErrors { window_s, channels: (first..channels).map(error).collect() }
 }

@@ -39,19 +39,25 @@ pub enum WiringFault {
     Swapped(usize, usize),
     /// An encoder gives this many times the counts that the file states.
     Counts(usize, f64),
+    /// A drive that imposes the cart's motion moves it against its pulses.
+    DriveReversed,
+    /// Such a drive moves the cart by this many times the travel per pulse that the file states.
+    Step(f64),
 }
 
 /// A wiring: its faults, none if it is that of the file.
 ///
 /// A machine seen from behind is the same machine: with all encoders and the motor reversed it moves as before. So
 /// a set of reversed encoders cannot be told from the others and the motor. Here the motor is reversed only where all
-/// encoders would have to be.
+/// encoders would have to be. Where the drive imposes the cart's motion, a set is the same as all others.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Wiring {
     /// What is wrong.
     pub faults: Vec<WiringFault>,
     /// Number of channels.
     pub channels: usize,
+    /// Whether the drive imposes the cart's motion.
+    pub is_moved: bool,
 }
 
 /// Result of the wiring check.
@@ -93,6 +99,15 @@ impl core::fmt::Display for WiringFault {
             WiringFault::Swapped(one, other) => {
                 write!(f, "the encoders of joint {one} and joint {other} are exchanged: exchange their plugs")
             }
+            WiringFault::DriveReversed => write!(
+                f,
+                "the cart moves against its pulses: exchange the wires of one coil of the motor, or invert the direction signal"
+            ),
+            WiringFault::Step(factor) => write!(
+                f,
+                "a pulse moves the cart by {} times step_m: correct step_m in the file, or the driver's microsteps",
+                significant(factor, 3)
+            ),
             WiringFault::Counts(channel, factor) => write!(
                 f,
                 "the encoder of {} gives {} times the counts of the file: correct its resolution in the file",
@@ -111,9 +126,14 @@ impl core::fmt::Display for Wiring {
         let faults: Vec<String> = self.faults.iter().map(ToString::to_string).collect();
         f.write_str(&faults.join("; "))?;
         let reversed = self.reversed();
-        if reversed.len() > 1 {
-            let others = (0..self.channels).filter(|channel| !reversed.contains(channel)).map(channel_name);
-            let others: Vec<String> = others.chain(["the motor".to_owned()]).collect();
+        if reversed.len() > 1 || (self.is_moved && 2 * reversed.len() == self.channels) {
+            let name = |channel: usize| match channel {
+                0 if self.is_moved => "the drive".to_owned(),
+                channel => channel_name(channel),
+            };
+            let others = (0..self.channels).filter(|channel| !reversed.contains(channel)).map(name);
+            let motor = (!self.is_moved).then(|| "the motor".to_owned());
+            let others: Vec<String> = others.chain(motor).collect();
             write!(f, " (or else reverse all others: {})", others.join(", "))?;
         }
         Ok(())
@@ -123,13 +143,14 @@ impl core::fmt::Display for Wiring {
 impl Wiring {
     fn with(&self, fault: WiringFault) -> Self {
         let faults = self.faults.iter().copied().chain([fault]).collect();
-        Self { faults, channels: self.channels }
+        Self { faults, ..*self }
     }
 
     /// The channels whose encoders are reversed.
     fn reversed(&self) -> Vec<usize> {
         let channel = |fault: &WiringFault| match *fault {
             WiringFault::Reversed(channel) => Some(channel),
+            WiringFault::DriveReversed => Some(0),
             _ => None,
         };
         self.faults.iter().filter_map(channel).collect()
@@ -140,6 +161,8 @@ impl Wiring {
         self.faults.iter().rev().fold(record.clone(), |record, &fault| match fault {
             WiringFault::MotorReversed => record.reversed(),
             WiringFault::Reversed(channel) => record.rewired(|row| scaled(row, channel, -1.0)),
+            WiringFault::DriveReversed => record.rewired(|row| scaled(row, 0, -1.0)),
+            WiringFault::Step(factor) => record.rewired(|row| scaled(row, 0, factor)),
             WiringFault::Counts(channel, factor) => record.rewired(|row| scaled(row, channel, 1.0 / factor)),
             WiringFault::Swapped(one, other) => record.rewired(|row| {
                 let mut row = row.to_vec();
@@ -150,28 +173,41 @@ impl Wiring {
     }
 
     /// Every combination of reversed encoders and motor, as in the file first.
-    fn signs(channels: usize) -> Vec<Self> {
+    fn signs(channels: usize, is_moved: bool) -> Vec<Self> {
         let of = |set: usize| {
             let reversed = (0..channels).filter(|channel| set >> channel & 1 == 1);
+            let fault = |channel: usize| match channel {
+                0 if is_moved => WiringFault::DriveReversed,
+                channel => WiringFault::Reversed(channel),
+            };
             let faults = match set.count_ones() as usize == channels {
                 true => vec![WiringFault::MotorReversed],
-                false => reversed.map(WiringFault::Reversed).collect(),
+                false => reversed.map(fault).collect(),
             };
-            Self { faults, channels }
+            Self { faults, channels, is_moved }
         };
-        (0..1 << channels).map(of).collect()
+        // Of a set and all others, the smaller one; of two that are equally large, that with the drive.
+        let is_smaller = |set: &usize| {
+            let twice = 2 * set.count_ones() as usize;
+            twice < channels || (twice == channels && set & 1 == 1)
+        };
+        (0..1 << channels).filter(|set| !is_moved || is_smaller(set)).map(of).collect()
     }
 
     /// This wiring with one more fault that is no sign: another pair, or an encoder whose counts are not yet wrong.
     fn with_another(&self) -> Vec<Self> {
         let pairs = (1..self.channels)
             .flat_map(|one| (one + 1..self.channels).map(move |other| WiringFault::Swapped(one, other)));
-        let counts =
-            (0..self.channels).flat_map(|channel| FACTORS.map(|factor| WiringFault::Counts(channel, factor)));
+        let fault = |channel: usize, factor: f64| match channel {
+            0 if self.is_moved => WiringFault::Step(factor),
+            channel => WiringFault::Counts(channel, factor),
+        };
+        let counts = (0..self.channels).flat_map(|channel| FACTORS.map(|factor| fault(channel, factor)));
         let is_of =
             |channel, fault: &WiringFault| matches!(*fault, WiringFault::Counts(of, _) if of == channel);
         let is_new = |fault: &WiringFault| match *fault {
             WiringFault::Counts(channel, _) => !self.faults.iter().any(|other| is_of(channel, other)),
+            WiringFault::Step(_) => !self.faults.iter().any(|other| matches!(other, WiringFault::Step(_))),
             _ => !self.faults.contains(fault),
         };
         pairs.chain(counts).filter(is_new).map(|fault| self.with(fault)).collect()
@@ -193,9 +229,9 @@ fn scaled(row: &[f64], channel: usize, factor: f64) -> Vec<f64> {
 }
 
 /// The wiring of the file, and the others that are tried first.
-fn wirings(channels: usize) -> (Wiring, Vec<Wiring>) {
-    let file = Wiring { faults: Vec::new(), channels };
-    let others = Wiring::signs(channels).into_iter().skip(1).chain(file.with_another()).collect();
+fn wirings(channels: usize, is_moved: bool) -> (Wiring, Vec<Wiring>) {
+    let file = Wiring { faults: Vec::new(), channels, is_moved };
+    let others = Wiring::signs(channels, is_moved).into_iter().skip(1).chain(file.with_another()).collect();
     (file, others)
 }
 
@@ -214,7 +250,9 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
             true => libm::log(rms.max(LEAST_RMS * record.steps[channel]) / record.extent(channel)[1]),
             false => f64::INFINITY,
         };
-        let score = fit.rms.iter().enumerate().map(of).sum::<f64>() / record.channels as f64;
+        let first = record.first_channel();
+        let score =
+            fit.rms.iter().enumerate().skip(first).map(of).sum::<f64>() / (record.channels - first) as f64;
         progress(ProgressStep::Done);
         (score, wiring.clone())
     };
@@ -226,7 +264,7 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
         scores.truncate(FINALISTS);
         parallel::map(&scores, |(_, wiring)| score(wiring, ITERATIONS))
     };
-    let (file, others) = wirings(record.channels);
+    let (file, others) = wirings(record.channels, record.is_moved);
     progress(ProgressStep::Begin("wiring", (1 + others.len() + FINALISTS) as u64));
     let (of_file, file) = score(&file, ITERATIONS);
     let mut scores = judge(&others);
@@ -257,5 +295,6 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
 /// The score of the least residuals.
 fn least(record: &Record) -> f64 {
     let of = |channel: usize| libm::log(LEAST_RMS * record.steps[channel] / record.extent(channel)[1]);
-    (0..record.channels).map(of).sum::<f64>() / record.channels as f64
+    let first = record.first_channel();
+    (first..record.channels).map(of).sum::<f64>() / (record.channels - first) as f64
 }

@@ -134,8 +134,10 @@ impl<'t> Shaken<'t> {
     ) -> Result<Self, HarnessError> {
         let mut harness = checked_and_hanging(rig, table, target, seed)?;
         let inputs = harness.inputs();
-        // The line of a board has room for the log and a little telemetry.
-        harness.session.ask(Request::Telemetry(ticks(rig, TELEMETRY_S) as u16), &inputs)?;
+        // The line of a board has room for the log and a little telemetry. Of a drive with pulses, only telemetry says
+        // whether it shakes the cart or holds it.
+        let telemetry_ticks = if table.steps.is_some() { 1 } else { ticks(rig, TELEMETRY_S) as u16 };
+        harness.session.ask(Request::Telemetry(telemetry_ticks), &inputs)?;
         harness.session.ask(Request::Log(true), &inputs)?;
         harness.session.ask(feed.begin(), &inputs)?;
         Ok(Self { harness, feed, recorder: Recorder::new(rig, table) })

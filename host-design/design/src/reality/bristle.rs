@@ -7,6 +7,8 @@
 //! in line), no natural frequency exceeds `ω² = Σ σ_i m_i`, because the trace of a matrix bounds its largest
 //! eigenvalue. A step is at most `0.25 / ω`.
 
+use crate::rig::FrictionLaw;
+
 /// Share of the Coulomb friction up to which the contact deforms elastically: 0.7169 in the example of Dupont et al.
 const ELASTIC_SHARE: f64 = 0.7;
 
@@ -29,6 +31,7 @@ const DAMPING_RATIO: f64 = 0.1;
 /// deflection then depends on the travel alone and is a parabola, so that it is integrated exactly over the travel and
 /// not over time (as in V. Hayward et al., "Discrete-time elasto-plastic friction estimation", IEEE Trans. Control
 /// Systems Technology 17(3), 2009). The curve z_ss is that of Hess and Soom (ASME Journal of Tribology 112, 1990).
+/// Other laws are those of [`FrictionLaw`]; Dahl's has `α = 1` everywhere.
 ///
 /// The friction is passive: `σ0 z ż <= σ0 z v` and `σ1 ż v >= 0`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +48,7 @@ pub struct Bristle {
     excess: f64,
     /// v_s: speed at which half of the excess is left (m/s or rad/s).
     stribeck: f64,
+    law: FrictionLaw,
 }
 
 /// The properties of a contact that define its bristle.
@@ -60,6 +64,8 @@ pub struct Contact {
     pub presliding: f64,
     /// Acceleration in this contact per force or torque in it, at rest (1/kg or 1/(kg·m²)).
     pub mobility: f64,
+    /// How the friction depends on travel and speed.
+    pub law: FrictionLaw,
 }
 
 /// A bristle after a travel.
@@ -82,6 +88,7 @@ impl Bristle {
             elastic: ELASTIC_SHARE * coulomb,
             excess: contact.breakaway_percent / 100.0,
             stribeck: contact.stribeck,
+            law: contact.law,
         }
     }
 
@@ -89,6 +96,9 @@ impl Bristle {
     /// `speed` (m/s or rad/s).
     #[inline]
     pub fn force(&self, deflection: f64, travel: f64, speed: f64) -> f64 {
+        if self.law == FrictionLaw::Creeping {
+            return self.stiffness * self.coulomb * libm::tanh(speed / self.stribeck);
+        }
         let moved = self.moved(deflection, travel, speed);
         self.stiffness * moved.deflection + self.damping * moved.sticking * speed
     }
@@ -109,6 +119,11 @@ impl Bristle {
         let direction = 1f64.copysign(if travel == 0.0 { speed } else { travel });
         let ratio = speed / self.stribeck;
         let sliding = self.coulomb * (1.0 + self.excess / (1.0 + ratio * ratio));
+        if self.law == FrictionLaw::Dahl {
+            // dz/dx = 1 - z sgn(v) / z_ss, exactly.
+            let off = (deflection - direction * sliding) * libm::exp(-travel.abs() / sliding);
+            return Moved { deflection: direction * sliding + off, sticking: -direction * off / sliding };
+        }
         // Deflection and travel in the direction of motion.
         let (before, travel) = (direction * deflection, travel.abs());
         let stuck = (self.elastic - before).max(0.0).min(travel);
@@ -127,8 +142,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const CONTACT: Contact =
-        Contact { coulomb: 2.0, breakaway_percent: 0.0, stribeck: 0.1, presliding: 1.3, mobility: 1.0 };
+    const CONTACT: Contact = Contact {
+        coulomb: 2.0,
+        breakaway_percent: 0.0,
+        stribeck: 0.1,
+        presliding: 1.3,
+        mobility: 1.0,
+        law: FrictionLaw::ElastoPlastic,
+    };
 
     #[test]
     fn the_friction_builds_up_over_the_presliding_and_then_stays() {
@@ -147,6 +168,19 @@ mod tests {
         let sliding = |speed: f64| bristle.stiffness * bristle.deflection(0.0, 100.0, speed);
         assert!((sliding(0.0) - 3.0).abs() < 1e-15 && (sliding(0.1) - 2.5).abs() < 1e-15);
         assert!((sliding(100.0) - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_dahl_bristle_creeps_and_a_creeping_contact_has_no_memory() {
+        let dahl = Bristle::new(&Contact { law: FrictionLaw::Dahl, ..CONTACT });
+        // z = z_c (1 - e^(-x/z_c)), z_c = 1.
+        assert!((dahl.force(0.0, 0.5, 0.0) - 2.0 * (1.0 - (-0.5f64).exp())).abs() < 1e-15);
+        // To and fro within the elastic range of the other law, it does not come back to where it was.
+        let to_and_fro = |bristle: &Bristle| bristle.deflection(bristle.deflection(0.5, 0.1, 0.0), -0.1, 0.0);
+        assert!(to_and_fro(&dahl) < 0.495 && (to_and_fro(&Bristle::new(&CONTACT)) - 0.5).abs() < 1e-15);
+        let creeping = Bristle::new(&Contact { law: FrictionLaw::Creeping, ..CONTACT });
+        assert!((creeping.force(0.9, 0.1, 0.1) - 2.0 * 1f64.tanh()).abs() < 1e-15);
+        assert_eq!(creeping.force(0.9, 0.1, 0.0), 0.0);
     }
 
     proptest! {

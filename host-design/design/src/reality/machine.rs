@@ -229,6 +229,7 @@ fn bristles<const N: usize>(rig: &Rig, mobility: &[f64]) -> (Option<[Bristle; N]
             stribeck,
             presliding,
             mobility,
+            law: rig.reality.friction_law,
         })
     };
     let joint = |j: usize| {

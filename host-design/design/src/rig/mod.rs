@@ -25,7 +25,6 @@ mod description;
 mod document;
 mod edit;
 mod error;
-mod force_only;
 mod key;
 mod load;
 mod node;
@@ -41,7 +40,6 @@ pub use description::Rig;
 pub use document::key_table;
 pub use edit::RigText;
 pub use error::{MAX_BYTES, Place, RigError, RigErrorKind};
-pub use force_only::ForceOnly;
 pub use key::{Absent, Key, Section, unit_in_names};
 pub use rule::Rule;
 pub use sections::actuator::{AccelerationDrive, Actuator, Motor};
@@ -55,7 +53,7 @@ pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
 pub use sections::reality::{
-    DriveTrain, DriverFaults, DryFriction, ParameterErrors, Reality, SensorErrors, StepMotorData,
+    DriveTrain, DriverFaults, DryFriction, FrictionLaw, ParameterErrors, Reality, SensorErrors, StepMotorData,
 };
 pub use sections::robust::Tolerances;
 pub use sections::swing_up::SwingUpRules;

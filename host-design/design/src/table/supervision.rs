@@ -94,9 +94,10 @@ pub(super) fn thresholds(design: Option<&DetectionDesign>) -> Thresholds<MAX_SEN
     thresholds
 }
 
-/// Largest force of the jog (N); without a force limit, only what the rig file gives.
+/// Largest force of the jog (N), or its like for a drive that imposes the acceleration (m/s²); without a limit, only
+/// what the rig file gives.
 fn jog_force_n(rig: &Rig) -> Option<f64> {
-    let (wanted, limit) = (rig.limits.jog_force_n, rig.force_limit_n());
+    let (wanted, limit) = (rig.limits.jog_force_n, rig.input_limit());
     let derived = limit.map(|limit| defaults::JOG_FORCE_SHARE * limit);
     wanted.or(derived).map(|force| force.min(limit.unwrap_or(f64::INFINITY)))
 }

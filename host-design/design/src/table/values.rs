@@ -302,7 +302,8 @@ fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> 
     })
 }
 
-fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable> {
+/// The drive with pulses as the controller sees it.
+pub(crate) fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable> {
     Ok(StepMap {
         step_m: finite("actuator.step_m", drive.step_m as f32)?,
         acceleration_limit_m_per_s2: finite(

@@ -92,7 +92,8 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     }
     // The masses that were chosen add up to the total mass that was identified.
     let realised = found.realised.unwrap();
-    let total: f64 = realised.cart_kg + realised.links.iter().map(|link| link.mass_kg).sum::<f64>();
+    let total: f64 =
+        realised.cart.unwrap().mass_kg + realised.links.iter().map(|link| link.mass_kg).sum::<f64>();
     assert!((total - of_total(&found.estimates)).abs() < 1e-9);
 }
 

@@ -3,21 +3,31 @@
 use std::path::Path;
 
 use upright_design::identify::{
-    CoverageError, CoveredQuantity, Drawn, DrawnMachine, Missed, ParameterKind, coverage, identified,
+    CoverageError, CoveredQuantity, Drawn, DrawnMachine, Missed, ParameterKind, TrueFriction, coverage,
+    identified,
 };
-use upright_design::rig::Rig;
+use upright_design::rig::{FrictionLaw, Rig};
 use upright_design::study::Study;
 
 fn rig(name: &str) -> Rig {
     Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap()
 }
 
-const DRAWN: Drawn = Drawn { runs: 2, off_percent: 10.0, seconds: 8.0, seed: 5, trust_wiring: true };
+const DRAWN: Drawn = Drawn {
+    runs: 2,
+    off_percent: 10.0,
+    seconds: 8.0,
+    friction: TrueFriction::OfFile,
+    seed: 5,
+    trust_wiring: true,
+};
 
 #[test]
 fn a_machine_is_the_same_every_time_and_within_what_is_stated() {
     let file = rig("triple-glueck-eder-kugi");
-    let draw = |off_percent: f64, number: u64| DrawnMachine::draw(&file, off_percent, 5, number).unwrap();
+    let draw = |off_percent: f64, number: u64| {
+        DrawnMachine::draw(&file, off_percent, TrueFriction::OfFile, 5, number).unwrap()
+    };
     for number in 0..20 {
         let machine = draw(10.0, number);
         let parameters = &machine.rig.reality.parameters;
@@ -36,6 +46,28 @@ fn a_machine_is_the_same_every_time_and_within_what_is_stated() {
     let exact = draw(0.0, 3);
     assert_eq!(exact.truth(ParameterKind::Length(1)), Some(0.419));
     assert!((exact.truth(ParameterKind::TotalMass).unwrap() - 6.367).abs() < 1e-9);
+}
+
+#[test]
+fn other_laws_of_friction_are_drawn_for_the_same_machines() {
+    let file = rig("double-quanser-dbpen");
+    let draw = |law: TrueFriction| DrawnMachine::draw(&file, 10.0, law, 5, 2).unwrap();
+    let own = draw(TrueFriction::OfFile);
+    for (law, expected) in [
+        (TrueFriction::Stribeck, FrictionLaw::ElastoPlastic),
+        (TrueFriction::Tanh, FrictionLaw::Creeping),
+        (TrueFriction::Dahl, FrictionLaw::Dahl),
+        (TrueFriction::LuGre, FrictionLaw::Dahl),
+    ] {
+        let other = draw(law);
+        assert_eq!(other.rig.reality.friction_law, expected);
+        // The friction in motion is the same; an excess at rest is there only where the law has one.
+        let kinds = [ParameterKind::CartDry, ParameterKind::JointDry(1), ParameterKind::Delay];
+        assert!(kinds.iter().all(|&kind| other.truth(kind) == own.truth(kind)));
+        let excess = other.rig.reality.friction.breakaway_percent;
+        let has_excess = matches!(law, TrueFriction::Stribeck | TrueFriction::LuGre);
+        assert!(if has_excess { (20.0..=60.0).contains(&excess) } else { excess == 0.0 }, "{excess}");
+    }
 }
 
 #[test]

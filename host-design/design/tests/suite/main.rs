@@ -8,6 +8,7 @@ mod design_properties;
 mod homing;
 mod identify;
 mod identify_coverage;
+mod identify_stepper;
 mod known_friction;
 mod lockstep;
 mod plant_equations;

@@ -181,8 +181,8 @@ impl DefectRun<'_> {
                 injection.serial(&mut harness.session);
                 is_visible |= trial.kind == Defect::TableBit;
             }
-            let (is_on, stops) = (self.is_on(&harness.session, &output), self.stops(&harness.session));
-            observed.output(tick, output, is_on, stops);
+            let is_on = self.is_on(&harness.session, &output);
+            observed.output(tick, output, is_on, self.ticks_since_stop(&harness.session));
             if observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
                 observed.fault = harness.session.fault();
             }
@@ -217,6 +217,11 @@ impl DefectRun<'_> {
     /// Whether telemetry says that a drive with pulses has stopped following the control law.
     fn stops(&self, session: &Session<'_>) -> bool {
         self.table.steps.is_some() && !session.status().state.controls()
+    }
+
+    /// Number of ticks since it has stopped: a board has telemetry of some ticks only.
+    fn ticks_since_stop(&self, session: &Session<'_>) -> usize {
+        if self.stops(session) { session.ticks_since_fault().unwrap_or(1) } else { 0 }
     }
 
     /// Pushes the rig in the next tick, `since` ticks after the onset: by hand, or at the cart alone.

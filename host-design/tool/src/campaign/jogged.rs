@@ -61,7 +61,7 @@ impl DefectRun<'_> {
                 continue;
             };
             let was_told = self.table.steps.is_some() && output.enable;
-            observed.output(tick, output, is_on, was_told);
+            observed.output(tick, output, is_on, was_told.into());
             observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = harness.session.fault();

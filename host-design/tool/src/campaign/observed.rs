@@ -33,13 +33,14 @@ pub(super) struct Observed {
 }
 
 impl Observed {
-    /// Records the firmware's output in `tick`, and whether the motor is on; `was_told` if telemetry says that it went
-    /// off in the tick before.
-    pub(super) fn output(&mut self, tick: usize, output: Output, is_on: bool, was_told: bool) {
+    /// Records the firmware's output in `tick`, and whether the motor is on; if it is not, it went off `before` ticks
+    /// before, as telemetry says.
+    pub(super) fn output(&mut self, tick: usize, output: Output, is_on: bool, before: usize) {
         self.outputs.push(output);
         self.on_again |= is_on && self.off.is_some();
         if !is_on {
-            self.off.get_or_insert(tick.saturating_sub(usize::from(was_told)));
+            let since = tick.saturating_sub(before);
+            self.off = Some(self.off.map_or(since, |off| off.min(since)));
         }
     }
 

@@ -5,6 +5,7 @@ use core::f64::consts::PI;
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
 use upright::supervision::shaking::ANGLE_RAD;
+use upright::supervision::supervisor::State;
 use upright_design::defects::{Defect, Expected, Injection, Phase, SHAKEN_S};
 use upright_design::harness::{HarnessError, Target};
 use upright_design::identify::{Feed, IdentifyError, Shaken};
@@ -38,7 +39,10 @@ impl During<'_> {
         match self {
             During::Balancing => true,
             During::Jog => kind.while_jogging().is_some(),
-            During::Shaking(_) => kind.while_shaken().is_some(),
+            // A host that hears nothing does not know that a drive with pulses has ended and only holds the cart.
+            During::Shaking(feed) => {
+                kind.while_shaken().is_some() && !(feed.is_of_pulses() && kind == Defect::HostDeaf)
+            }
         }
     }
 
@@ -63,6 +67,9 @@ impl DefectRun<'_> {
         for tick in 0usize.. {
             let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
             let inputs = self.pins(&mut shaken.harness, &mut injection, since, &mut false)?;
+            if let Some(defect) = since.and_then(|since| injection.step_defect(since)) {
+                shaken.harness.bench.spoil(defect);
+            }
             shaken.harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
             let acted = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive));
             let output = match acted {
@@ -72,7 +79,11 @@ impl DefectRun<'_> {
                 }
                 output => output?,
             };
-            observed.output(tick, output, output.enable, false);
+            // A drive with pulses also holds the cart and brings it to rest, which does not count.
+            let state = shaken.harness.session.status().state;
+            let is_shaken = self.table.steps.is_none() || state == State::Identifying;
+            let before = usize::from(output.enable && !is_shaken);
+            observed.output(tick, output, output.enable && is_shaken, before);
             observed.outside |= observed.off.is_none() && self.is_out_of_bounds(shaken.harness.bench.state());
             if observed.off.is_some() {
                 observed.fault = shaken.harness.session.fault();

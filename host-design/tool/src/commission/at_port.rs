@@ -82,8 +82,8 @@ impl MachineAtHand for AtPort {
         PATIENCE
     }
 
-    fn again(&mut self, failed: CommissionStep) -> bool {
-        let words = format!("    r and Enter: back to {}; only Enter: stop", failed.back().name());
+    fn again(&mut self, _: CommissionStep, back: CommissionStep) -> bool {
+        let words = format!("    r and Enter: back to {}; only Enter: stop", back.name());
         self.consent(&words).is_ok_and(|said| said.trim() == "r")
     }
 }

@@ -11,6 +11,7 @@ use upright_design::plant::absolute_angles;
 
 use super::guide::Guide;
 use super::machine::Stop;
+use super::plan::CommissionPlan;
 use super::task::PersonTask;
 
 /// Time for which the machine has to balance.
@@ -36,7 +37,8 @@ impl LargestMotion {
 }
 
 /// The links are raised by hand, the motor comes on, the hand lets go, and the rig balances.
-pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
+pub(super) fn balance(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
+    let is_moved = plan.table.steps.is_some();
     guide.ask(PersonTask::Centre)?;
     guide.pause(Duration::from_secs(1))?;
     guide.ask(PersonTask::Raise)?;
@@ -65,10 +67,13 @@ pub(super) fn balance(guide: &mut Guide<'_>) -> Result<(), Stop> {
         let name = fault.map_or("no fault".to_owned(), |fault| fault.to_string());
         return Err(Stop::Machine(format!("the motor went off after {seconds:.1} s: {name}; {remedy}")));
     }
+    let (name, unit) = if is_moved { ("acceleration", "m/s²") } else { ("force", "N") };
     guide.found(format!(
-        "balanced for {:.0} s: force {:.2} N rms, links up to {:.1}°, cart up to {:.0} mm",
+        "balanced for {:.0} s: {} {:.2} {} rms, links up to {:.1}°, cart up to {:.0} mm",
         BALANCED.as_secs_f64(),
+        name,
         (motion.force_squared / motion.messages.max(1.0)).sqrt(),
+        unit,
         motion.lean_rad.to_degrees(),
         1e3 * motion.cart_m
     ));

@@ -74,10 +74,11 @@ impl<'a> Commissioning<'a> {
                 guide.turn_off();
             }
             guide.journal.end(result.as_ref().err().map(ToString::to_string))?;
+            let back = step.back(self.plan.table.steps.is_some());
             match result {
                 Ok(()) => next += 1,
-                Err(Stop::Machine(_)) if guide.machine.again(step) => {
-                    next = steps.iter().position(|&one| one == step.back()).unwrap_or(next);
+                Err(Stop::Machine(_)) if guide.machine.again(step, back) => {
+                    next = steps.iter().position(|&one| one == back).unwrap_or(next);
                 }
                 Err(stop) => return Err(stop),
             }
@@ -97,7 +98,7 @@ impl<'a> Commissioning<'a> {
             CommissionStep::Homing => homing::home(guide, plan)?,
             CommissionStep::Signs => signs::check(guide)?,
             CommissionStep::Turns => signs::turns(guide, plan)?,
-            CommissionStep::Motor => motor::check(guide)?,
+            CommissionStep::Motor => motor::check(guide, plan)?,
             CommissionStep::Excitation => {
                 let seed = plan.seed.wrapping_add(self.shaken);
                 self.shaken += 1;
@@ -116,7 +117,7 @@ impl<'a> Commissioning<'a> {
             }
             // The firmware changes here; this one has nothing to do.
             CommissionStep::Image => {}
-            CommissionStep::Balance => balance::balance(guide)?,
+            CommissionStep::Balance => balance::balance(guide, plan)?,
         }
         Ok(())
     }

@@ -1,7 +1,10 @@
 //! Homing by the limit switches.
 
+use std::time::Duration;
+
 use upright::protocol::message::Request;
 use upright::supervision::homing::Homing;
+use upright::supervision::slow_drive::HOMING_M_PER_S;
 use upright_design::client::AnyTelemetry;
 
 use super::guide::Guide;
@@ -9,6 +12,8 @@ use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::task::{End, PersonTask};
 
+/// Time in which links come to rest after a slow motion of the cart.
+const SWINGING: Duration = Duration::from_secs(60);
 /// A sensor has moved if it counts at least this share of the expected counts.
 const MOVED: f64 = 0.1;
 
@@ -24,8 +29,14 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
     let is_begun = |now: &AnyTelemetry| matches!(now.homing, Homing::Touch { .. });
     guide.request_until(Request::HomeRail, is_begun)?;
     let mut ends = Vec::new();
+    let is_driven = plan.table.steps.is_some();
+    if is_driven {
+        guide.ask(PersonTask::HandsOff)?;
+    }
     for end in [End::Low, End::High] {
-        guide.ask(PersonTask::PushTo(end))?;
+        if !is_driven {
+            guide.ask(PersonTask::PushTo(end))?;
+        }
         let touched = move |now: &AnyTelemetry| {
             let is_there = match (now.homing, end) {
                 (Homing::Touch { low, .. }, End::Low) => low,
@@ -36,7 +47,11 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
             is_there.then(|| now.counts.iter().map(|&count| f64::from(count)).collect::<Vec<_>>())
         };
         let not_touched = || Stop::Machine("the cart has not touched both limit switches".to_owned());
-        ends.push(guide.wait_for_person(touched)?.ok_or_else(not_touched)?);
+        let reached = match is_driven {
+            true => guide.wait(longest(plan), touched)?,
+            false => guide.wait_for_person(touched)?,
+        };
+        ends.push(reached.ok_or_else(not_touched)?);
     }
     let moved: Vec<f64> = ends[1].iter().zip(&ends[0]).map(|(high, low)| high - low).collect();
     let homing = guide.conversation().telemetry.as_ref().map(|now| now.homing);
@@ -48,15 +63,37 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
         moved[0] * step(plan, 0),
         wanted_m(plan)
     ));
-    guide.ask(PersonTask::Centre)?;
     let is_homed = |now: &AnyTelemetry| now.homing == Homing::Homed;
+    if is_driven {
+        // It goes to the middle by itself, and homes as soon as the links hang still.
+        guide.ask(PersonTask::Rest)?;
+        let homed = guide.wait(longest(plan), |now| is_homed(now).then_some(()))?;
+        if homed.is_none() {
+            return Err(Stop::Machine("cart and links do not come to rest between the switches".to_owned()));
+        }
+        return Ok(());
+    }
+    guide.ask(PersonTask::Centre)?;
     guide.need(is_homed, "cart and links do not come to rest between the switches")
+}
+
+/// Longest time in which a drive with pulses goes from end to end, and the links come to rest.
+fn longest(plan: CommissionPlan<'_>) -> Duration {
+    Duration::from_secs_f64(2.0 * wanted_m(plan) / f64::from(HOMING_M_PER_S)) + SWINGING
 }
 
 /// What is wrong if the switches are not as far apart as the file says; `moved` are all sensors' counts from one to
 /// the other.
 fn wrong_travel(plan: CommissionPlan<'_>, moved: &[f64]) -> String {
     let wanted = f64::from(plan.table.limits.travel_counts[0]);
+    if plan.table.steps.is_some() {
+        return format!(
+            "a limit switch does not open where it should: {:.4} m of pulses so far, {:.4} m between the switches in the file: \
+             does the drive move the cart, and along +x for positive pulses? Else correct step_m or travel_m",
+            moved[0].abs() * step(plan, 0),
+            wanted_m(plan)
+        );
+    }
     let tolerance = f64::from(plan.table.limits.travel_counts[1]);
     let other = moved.iter().skip(1).position(|counts| counts.abs() > MOVED * wanted);
     if moved[0].abs() < MOVED * wanted {

@@ -30,8 +30,8 @@ pub trait MachineAtHand {
     /// How long the person may take for a task.
     fn patience(&self) -> Duration;
 
-    /// Whether the person wants to go [back](CommissionStep::back) from a step that was not passed.
-    fn again(&mut self, failed: CommissionStep) -> bool;
+    /// Whether the person wants to go back from a step that was not passed to [`back`](CommissionStep::back).
+    fn again(&mut self, failed: CommissionStep, back: CommissionStep) -> bool;
 }
 
 /// Why a rig is not commissioned.

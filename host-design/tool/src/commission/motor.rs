@@ -9,6 +9,7 @@ use upright::supervision::supervisor::State;
 
 use super::guide::Guide;
 use super::machine::Stop;
+use super::plan::CommissionPlan;
 use super::task::PersonTask;
 use crate::monitor::words;
 
@@ -20,7 +21,12 @@ const BEGINS: Duration = Duration::from_millis(300);
 const LONGEST: Duration = Duration::from_millis(1_500);
 
 /// The motor pushes the cart along +x until it has moved a little.
-pub(super) fn check(guide: &mut Guide<'_>) -> Result<(), Stop> {
+pub(super) fn check(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
+    if plan.table.steps.is_some() {
+        // The links show the direction: they must not swing.
+        guide.ask(PersonTask::Rest)?;
+        guide.pause(STILL)?;
+    }
     guide.ask(PersonTask::HandsOff)?;
     let end = guide.machine.now() + guide.machine.patience();
     while !push(guide)? {

@@ -6,7 +6,7 @@ use core::str::FromStr;
 use upright::board::Output;
 use upright_design::harness::Pins;
 use upright_design::rig::{Link, PerJoint, Rig};
-use upright_design::simulate::{Bench, Scenario};
+use upright_design::simulate::{Bench, Scenario, StepDefect};
 use upright_design::table::TableValues;
 
 use super::step::CommissionStep;
@@ -191,6 +191,15 @@ impl<'a> DefectWires<'a> {
                 *count = Bench::reading(sensor, count.wrapping_mul(2).wrapping_sub(begin));
             }
             (What::Campaign(_) | What::CartFriction | What::JointFriction, _) => {}
+        }
+    }
+
+    /// What is wrong in this tick with a drive that takes pulses.
+    pub(super) fn step_defect(&self) -> Option<StepDefect> {
+        match (self.planted.what, &self.defective) {
+            (What::CartFriction, _) => Some(StepDefect::Jammed),
+            (_, Some(defective)) => defective.step_defect(),
+            _ => None,
         }
     }
 

@@ -45,7 +45,7 @@ fn until_over(guide: &mut Guide<'_>, line: &mut OverLine) -> Result<(), Stop> {
     let failed = |error: LineError| match error {
         LineError::Silent => Stop::Line(error.to_string()),
         LineError::Fault(Fault::Frozen) => Stop::Machine(format!(
-            "{error}: it has counted by hand, so it sticks; look for friction, or give the rig file a larger jog_force_n"
+            "{error}: it has counted by hand, so it sticks; look for friction, or give the rig file a larger jog_force_n; of a stepper, check the drive"
         )),
         error => Stop::Machine(error.to_string()),
     };

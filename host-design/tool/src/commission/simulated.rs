@@ -39,6 +39,8 @@ pub struct Simulated<'a> {
     counters: Vec<u32>,
     supply_v: f32,
     rail: RailEnds,
+    /// Travel per pulse (m) of a drive that takes them: no hand moves its cart while it is on.
+    pulse_m: Option<f64>,
     period_s: f64,
     ticks: u64,
 }
@@ -76,6 +78,7 @@ impl<'a> Simulated<'a> {
             counters: vec![0; table.sensors()],
             supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
             rail: RailEnds::of(&machine),
+            pulse_m: machine.actuator.acceleration.as_ref().map(|drive| drive.step_m),
             period_s: machine.tick.period_s,
             ticks: 0,
         })
@@ -109,6 +112,9 @@ impl<'a> Simulated<'a> {
         if self.is_free {
             let mut output = self.output;
             if let Some(wires) = &mut self.wires {
+                if let Some(defect) = wires.step_defect().filter(|_| self.pulse_m.is_some()) {
+                    self.bench.spoil(defect);
+                }
                 wires.output(&mut output);
             }
             // A motor that is off turns freely.
@@ -119,15 +125,25 @@ impl<'a> Simulated<'a> {
 
     /// What the hand does in a tick.
     fn by_hand(&mut self) {
-        let was_free = std::mem::replace(&mut self.is_free, self.task.lets_go(self.output.enable));
-        if self.is_free {
+        // A drive with pulses also holds the cart before the control law commands it.
+        let controls = || self.session.status().state.controls();
+        let is_on = self.output.enable && (self.pulse_m.is_none() || controls());
+        let was_free = std::mem::replace(&mut self.is_free, self.task.lets_go(is_on));
+        if was_free && self.is_free {
             return;
         }
+        let driven_m = self.pulse_m.filter(|_| self.output.enable);
         if was_free {
             self.held.take(self.bench.state());
             self.held.stop();
+        } else if let Some(pulse_m) = driven_m {
+            self.held.carry(f64::from(self.output.pulses()) * pulse_m);
         }
         match self.task {
+            _ if self.is_free => {}
+            PersonTask::Move(0) | PersonTask::PushTo(_) | PersonTask::Centre if driven_m.is_some() => {
+                self.held.rest();
+            }
             PersonTask::Move(sensor) => self.held.turn(sensor),
             PersonTask::PushTo(end) => {
                 self.held.push_to(self.rail.pressed_m()[usize::from(end == End::High)]);
@@ -178,7 +194,7 @@ impl MachineAtHand for Simulated<'_> {
     }
 
     /// The beginning of an excitation may be too weak for a cart that sticks: other phases are tried.
-    fn again(&mut self, failed: CommissionStep) -> bool {
+    fn again(&mut self, failed: CommissionStep, _: CommissionStep) -> bool {
         let goes_back = failed == CommissionStep::Excitation && self.tries < TRIES;
         self.tries += u32::from(goes_back);
         goes_back

@@ -84,9 +84,13 @@ impl CommissionStep {
     pub const SECOND: [CommissionStep; 5] =
         [Self::Connect, Self::Homing, Self::Signs, Self::Motor, Self::Balance];
 
-    /// The step to go back to if this one is not passed.
-    pub fn back(self) -> Self {
+    /// The step to go back to if this one is not passed; `loses_cart`: the drive lets go of the cart after each step
+    /// that moves it, and then nobody knows where that is.
+    pub fn back(self, loses_cart: bool) -> Self {
         match self {
+            Self::Identification | Self::Design | Self::Verification | Self::Motor if loses_cart => {
+                Self::Homing
+            }
             // A fault may have lost the positions.
             Self::Excitation | Self::Balance => Self::Homing,
             // Another log may be better.

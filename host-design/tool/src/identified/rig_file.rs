@@ -53,12 +53,15 @@ pub fn rig_file(
 /// Keys and values, with six digits: more than the identification knows.
 fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, String)> {
     let number = |value: f64| rounded(value, 6).to_string();
-    let mut values = vec![
-        ("cart.mass_kg".to_owned(), number(realised.cart_kg)),
-        ("cart.friction_n_s_per_m".to_owned(), number(realised.cart_viscous)),
-        ("reality.cart_friction_n".to_owned(), number(realised.cart_dry_n)),
-        ("reality.rail_tilt_rad".to_owned(), number(realised.tilt_rad)),
-    ];
+    let mut values = Vec::new();
+    if let Some(cart) = realised.cart {
+        values.extend([
+            ("cart.mass_kg".to_owned(), number(cart.mass_kg)),
+            ("cart.friction_n_s_per_m".to_owned(), number(cart.viscous)),
+            ("reality.cart_friction_n".to_owned(), number(cart.dry_n)),
+        ]);
+    }
+    values.push(("reality.rail_tilt_rad".to_owned(), number(realised.tilt_rad)));
     for (index, link) in realised.links.iter().enumerate() {
         let key = |name: &str| format!("link[{}].{name}", index + 1);
         values.extend([
@@ -92,6 +95,7 @@ fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, Strin
 #[cfg(test)]
 mod tests {
     use super::*;
+    use upright_design::identify::RealisedCart;
 
     /// An identification that found nothing new.
     const NOTHING: Identification = Identification {
@@ -107,6 +111,7 @@ mod tests {
         delay_ticks: 0,
         refusal: None,
         is_driven: true,
+        is_moved: false,
         left_out: Vec::new(),
         doubts: Vec::new(),
         predicted: Vec::new(),
@@ -165,9 +170,7 @@ mod tests {
             air_drag: 0.0,
         };
         let realised = Realised {
-            cart_kg: 1.0,
-            cart_viscous: 2.0,
-            cart_dry_n: 0.0,
+            cart: Some(RealisedCart { mass_kg: 1.0, viscous: 2.0, dry_n: 0.0 }),
             links: vec![link],
             tilt_rad: 0.0,
             dead_zone_v: 0.0,

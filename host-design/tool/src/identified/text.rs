@@ -83,8 +83,8 @@ fn fits(text: &mut String, found: &Identification) {
         "\n  {:<10}{:>22}{:>26}{:>14}",
         "channel", "innovation variance", "error over 0.5 s: file", "found"
     );
-    for (index, channel) in found.channels.iter().enumerate() {
-        let [old, new] = channel.held_out.map(|error| error_text(index, error));
+    for channel in &found.channels {
+        let [old, new] = channel.held_out.map(|error| error_text(channel.channel, error));
         let _ =
             writeln!(text, "  {:<10}{:>22.2}{old:>26}{new:>14}", channel.name, channel.innovation_variance);
     }
@@ -122,9 +122,17 @@ pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
 fn scale_note(found: &Identification, settings: &Settings) -> String {
     match settings.weighed_kg_m {
         Some(moment) => format!(
-            "Masses and frictions in the new file are scaled to the weighed {} kg·m of the last link, and resistance_ohm with them.",
-            significant(moment, 4)
+            "Masses and frictions in the new file are scaled to the weighed {} kg·m of the last link{}.",
+            significant(moment, 4),
+            if found.is_moved { "" } else { ", and resistance_ohm with them" }
         ),
+        None if found.is_moved => {
+            "The drive moves the cart whatever force that takes: the cart's mass and friction are not seen and stay as in the \
+             file, and a common factor of all other masses, moments and frictions changes no motion. The first moment of the last \
+             link is that of the file, and the deviations are those of ratios to it. One weighing of the last link gives true \
+             kilograms (--weigh)."
+                .to_owned()
+        }
         None if !found.is_driven => {
             "Without a drive, a common factor of all masses, moments and frictions changes no motion: the first moment of the last \
              link is that of the file, and the deviations are those of ratios to it. One weighing of the last link gives true \
@@ -216,7 +224,7 @@ pub fn json(rig: &str, found: &Identification) -> Value {
     json!({
         "rig": rig, "seconds": found.seconds, "lost_ticks": found.lost_ticks,
         "largest_angle_rad": found.largest_angle_rad, "wiring": wiring, "estimates": estimates,
-        "is_driven": found.is_driven, "left_out": windows_json(&found.left_out), "predicted": windows_json(&found.predicted),
+        "is_driven": found.is_driven, "is_moved": found.is_moved, "left_out": windows_json(&found.left_out), "predicted": windows_json(&found.predicted),
         "channels": channels, "delay_ticks": found.other_delay().unwrap_or(found.delay_ticks),
         "doubts": found.doubts.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "refused": found.refusal.as_ref().map(ToString::to_string),

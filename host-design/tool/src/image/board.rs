@@ -58,6 +58,15 @@ impl BoardName {
         self.conditions(0).wiring.encoders.len()
     }
 
+    /// Most step pulses in a tick: its timer counts them with 8 bits.
+    pub const PULSES: u32 = 256;
+
+    /// Most step pulses in a second, with a tick of `tick_s` (s). A tick may have a pulse more than its speed needs,
+    /// because positions are rounded; and a driver needs 2.5 µs from a change of direction to a pulse.
+    pub fn most_pulses_hz(self, tick_s: f64) -> f64 {
+        (f64::from(Self::PULSES - 1) / tick_s).min(200e3)
+    }
+
     /// Shortest and longest tick that it can make (s).
     pub const fn tick_s(self) -> [f64; 2] {
         [0.000_12, 0.033]

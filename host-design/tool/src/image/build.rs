@@ -9,7 +9,8 @@ use super::compiler::{Compiler, compiler, target_directory};
 use super::error::{BuildError, TARGET};
 use super::kept;
 use crate::project::checkout;
-use upright::gains::{SENSORS, TICK_S};
+use upright::gains::{SENSORS, TABLE, TICK_S};
+use upright::table::StepMap;
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source, write_atomically};
 
@@ -51,7 +52,7 @@ impl ImageKind {
 /// # Errors
 /// [`BuildError`] if the board cannot serve the table's rig, there is no compiler, or it fails.
 pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
-    check_board(kind, SENSORS, f64::from(TICK_S))?;
+    check_board(kind, SENSORS, f64::from(TICK_S), TABLE.steps.as_ref())?;
     compile(kind, None, kind.name())
 }
 
@@ -60,7 +61,7 @@ pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
 /// # Errors
 /// As for [`build`].
 pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
-    check_board(kind, table.sensors(), rig.tick.period_s)?;
+    check_board(kind, table.sensors(), rig.tick.period_s, table.steps.as_ref())?;
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
@@ -77,7 +78,12 @@ pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<Path
 }
 
 /// Checks what the board of the image can do before the compiler is started, whose errors name lines of the image.
-fn check_board(kind: ImageKind, needed: usize, tick_s: f64) -> Result<(), BuildError> {
+fn check_board(
+    kind: ImageKind,
+    needed: usize,
+    tick_s: f64,
+    steps: Option<&StepMap>,
+) -> Result<(), BuildError> {
     let Some(board) = kind.board() else { return Ok(()) };
     if needed > board.encoders() {
         return Err(BuildError::Encoders { board, needed });
@@ -85,7 +91,12 @@ fn check_board(kind: ImageKind, needed: usize, tick_s: f64) -> Result<(), BuildE
     let [shortest_s, longest_s] = board.tick_s();
     // The committed table has the tick as f32.
     let is_possible = (shortest_s * (1.0 - 1e-6)..=longest_s * (1.0 + 1e-6)).contains(&tick_s);
-    if is_possible { Ok(()) } else { Err(BuildError::Tick { board, tick_s }) }
+    if !is_possible {
+        return Err(BuildError::Tick { board, tick_s });
+    }
+    let most = board.most_pulses_hz(tick_s);
+    let rate = steps.map_or(0.0, |steps| f64::from(steps.speed_limit_m_per_s) / f64::from(steps.step_m));
+    if rate > most { Err(BuildError::Pulses { board, most, rate }) } else { Ok(()) }
 }
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler
@@ -151,15 +162,26 @@ mod tests {
     fn what_the_board_cannot_do_is_refused_before_the_compiler_is_started() {
         let feather = ImageKind::Board(BoardName::FeatherF405);
         for tick_s in [0.05, 1.1e-4] {
-            let refused = check_board(feather, 2, tick_s).unwrap_err().to_string();
+            let refused = check_board(feather, 2, tick_s, None).unwrap_err().to_string();
             let tick = format!("0.12 to 33 ms, and this rig's is {} ms", tick_s * 1e3);
             assert!(refused.starts_with("feather-f405") && refused.contains(&tick), "{refused}");
         }
-        assert!(check_board(feather, 3, 1e-3).unwrap_err().to_string().contains("counts 2 encoders"));
+        assert!(check_board(feather, 3, 1e-3, None).unwrap_err().to_string().contains("counts 2 encoders"));
         // As in the rig file, and as rounded in the table.
         for tick_s in [1.2e-4, f64::from(1.2e-4_f32), 1e-3, 0.033, f64::from(0.033_f32)] {
-            assert!(check_board(feather, 2, tick_s).is_ok(), "{tick_s}");
+            assert!(check_board(feather, 2, tick_s, None).is_ok(), "{tick_s}");
         }
-        assert!(check_board(ImageKind::InTheLoop, 5, 0.05).is_ok());
+        let steps = |speed_limit_m_per_s| StepMap {
+            step_m: 5e-5,
+            acceleration_limit_m_per_s2: 8.0,
+            speed_limit_m_per_s,
+        };
+        let refused =
+            |tick_s, speed| check_board(feather, 2, tick_s, Some(&steps(speed))).unwrap_err().to_string();
+        assert!(check_board(feather, 2, 1e-2, Some(&steps(1.2))).is_ok());
+        let too_many = refused(1e-2, 1.3);
+        assert!(too_many.contains("25500 step pulses") && too_many.contains("26000"), "{too_many}");
+        assert!(refused(1e-3, 10.5).contains("200000 step pulses"), "{}", refused(1e-3, 10.5));
+        assert!(check_board(ImageKind::InTheLoop, 5, 0.05, None).is_ok());
     }
 }

@@ -44,6 +44,20 @@ pub enum BuildError {
         /// The rig's tick (s).
         tick_s: f64,
     },
+    /// The drive takes more pulses than the board gives.
+    #[error(
+        "{board} gives {most:.0} step pulses in a second at most, {} of them in a tick, and the drive of this rig may \
+         take {rate:.0}: lower actuator.step_rate_limit_hz",
+        BoardName::PULSES
+    )]
+    Pulses {
+        /// Which board.
+        board: BoardName,
+        /// Most pulses in a second, at the rig's tick.
+        most: f64,
+        /// Pulses of this rig's drive in a second, at most.
+        rate: f64,
+    },
     /// A Pico or Pico 2 cannot run the rig.
     #[error(transparent)]
     Pico(#[from] PicoError),

@@ -23,7 +23,7 @@ mod qemu;
 mod relay;
 
 pub use board::{
-    Compared, Event, Events, RULES, Span, TickCycles, TickFigures, TooLong, VirtualBoard, measure,
+    Compared, Event, Events, PulseWatch, RULES, Span, TickCycles, TickFigures, TooLong, VirtualBoard, measure,
 };
 pub use error::RunError;
 pub use place::{RunPlace, run, run_compared, run_shaken};

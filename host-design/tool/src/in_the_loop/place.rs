@@ -94,8 +94,9 @@ pub fn run_shaken(
 }
 
 /// Runs `scenario` on the virtual board as [`run`] does, and in each tick the firmware on the host with the inputs
-/// that the board's image has latched. The duty must agree to the timer's clock, estimate and telemetry in every bit.
-/// Returns the recording, and the numbers of ticks and of telemetry messages that were compared.
+/// that the board's image has latched. The duty must agree to the timer's clock, the number of pulses exactly, estimate
+/// and telemetry in every bit. Returns the recording, and the numbers of ticks and of telemetry messages that were
+/// compared.
 ///
 /// # Errors
 /// [`RunError`] as for [`run`], and if the two differ.

@@ -52,6 +52,26 @@ fn a_sound_machine_passes_every_early_step() {
 }
 
 #[test]
+fn a_machine_on_a_stepper_is_commissioned_and_its_defects_stop_it() {
+    let (_, table) = rig_and_table("double-stepper");
+    assert_eq!(stopped("double-stepper", table, None, &CommissionStep::FIRST), None);
+    let cases = [
+        ("limit-switch-missing", CommissionStep::Contacts, "the limit switch at the high end does not open"),
+        ("motor-reversed", CommissionStep::Homing, "along +x for positive pulses"),
+        ("cart-stuck", CommissionStep::Homing, "does the drive move the cart"),
+        ("encoder-reversed", CommissionStep::Signs, "counts the wrong way"),
+        ("encoders-swapped", CommissionStep::Signs, "swap their plugs"),
+        ("counts-wrong", CommissionStep::Turns, "correct encoder_counts_per_rev"),
+    ];
+    for (name, wanted, remedy) in cases {
+        let planted = name.parse().unwrap();
+        let (step, words) =
+            stopped("double-stepper", table, Some(planted), &CommissionStep::FIRST).expect("it is found");
+        assert!(step == wanted && words.contains(remedy), "{name}: {step:?}: {words}");
+    }
+}
+
+#[test]
 fn every_planted_defect_is_found_in_its_step() {
     for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
         let (_, table) = rig_and_table(name);

@@ -84,8 +84,8 @@ impl MachineAtHand for Heard {
         Duration::from_secs(4)
     }
 
-    fn again(&mut self, failed: CommissionStep) -> bool {
-        self.port.again(failed)
+    fn again(&mut self, failed: CommissionStep, back: CommissionStep) -> bool {
+        self.port.again(failed, back)
     }
 }
 

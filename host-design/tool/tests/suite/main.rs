@@ -45,6 +45,7 @@ mod site_shown;
 mod site_twin;
 mod split_command;
 mod stepper_command;
+mod stepper_on_board;
 mod transitions_command;
 mod twin_access;
 mod twin_guide;

@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use upright_tool::image::{BoardName, ImageKind};
+
 use crate::command::{status, stderr, stdout, upright};
-use crate::published::rig_path;
+use crate::equipment::built_for;
+use crate::published::{rig_and_table, rig_path};
 
 fn stepper() -> String {
     rig_path("single-stepper").display().to_string()
@@ -43,24 +46,40 @@ fn check_design_simulate_and_export_serve_a_stepper() {
 }
 
 #[test]
-fn commands_that_do_not_serve_a_stepper_refuse_it_by_name() {
-    let rig = stepper();
-    let refused = |arguments: &[&str]| {
-        let output = upright(arguments);
-        assert_eq!(status(&output), 2, "{arguments:?}: {}", stderr(&output));
-        let words =
-            format!("single-stepper: `upright {}` serves only drives that give a force", arguments[0]);
-        assert!(stderr(&output).contains(&words), "{arguments:?}: {}", stderr(&output));
-    };
-    refused(&["commission", &rig, "--target", "host"]);
-    refused(&["identify", &rig, "nothing.log"]);
-    for (command, option) in [("twin", "--target"), ("faults", "--target"), ("faults", "--shake")] {
-        let target = if option == "--target" { &["qemu"][..] } else { &[] };
-        let output = upright(&[&[command, &rig, option], target].concat());
-        assert_eq!(status(&output), 2, "{}", stderr(&output));
-        let words = format!("`upright {command} {option}` serves only drives that give a force");
-        assert!(stderr(&output).contains(&words), "{}", stderr(&output));
+fn commands_with_an_image_serve_a_stepper() {
+    let (rig, table) = rig_and_table("single-stepper");
+    if built_for(ImageKind::Board(BoardName::WeactF405), rig, table).is_none() {
+        return;
     }
+    let board = ["--target", "board"];
+    for arguments in [
+        &["firmware", "run", "--duration", "1", "--step", "0.02"][..],
+        &["twin", "--duration", "0.5"],
+        &["faults", "--kind", "motor-dead", "--runs", "2"],
+        &["firmware", "build"],
+    ] {
+        let with = if arguments == ["firmware", "build"] { &[][..] } else { &board };
+        let output = upright(&[arguments, &[&stepper()], with].concat());
+        assert_eq!(status(&output), 0, "{arguments:?}: {}", stderr(&output));
+    }
+    // More pulses than the timer gives in a tick of 30 ms.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("slow.toml");
+    let slow = std::fs::read_to_string(stepper()).unwrap().replace("period_s = 0.01", "period_s = 0.03");
+    std::fs::write(&file, slow).unwrap();
+    let refused = upright(&["firmware", "build", file.to_str().unwrap()]);
+    assert!(
+        status(&refused) != 0 && stderr(&refused).contains("256 of them in a tick"),
+        "{}",
+        stderr(&refused)
+    );
+}
+
+#[test]
+fn defects_while_a_stepper_shakes_its_links_are_not_missed() {
+    let output = upright(&["faults", &stepper(), "--shake", "--runs", "56"]);
+    assert_eq!(status(&output), 0, "{}{}", stdout(&output), stderr(&output));
+    assert!(stdout(&output).contains("24 of 24 runs miss the defect, as they must"), "{}", stdout(&output));
 }
 
 #[test]

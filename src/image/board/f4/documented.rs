@@ -22,7 +22,7 @@ fn connected_to(signal: Signal) -> String {
     match signal {
         Signal::Encoder(0, channel) => format!("cart encoder, {}", char::from(channel)),
         Signal::Encoder(link, channel) => format!("link {link} encoder, {}", char::from(channel)),
-        Signal::Pwm => "power stage, PWM: high drives".to_owned(),
+        Signal::Pwm => "power stage, PWM: high drives; or STEP".to_owned(),
         Signal::Direction => "power stage, direction: high pushes along +x".to_owned(),
         Signal::Enable => "power stage, enable: high; 10 kΩ to ground".to_owned(),
         Signal::DriverFault => "power stage, fault: low; open drain".to_owned(),

@@ -5,6 +5,7 @@ use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 
 use super::boards::BOARD;
+use super::motor::GIVES_PULSES;
 use super::wiring::{Signal, encoders, wire_of};
 
 /// The timers in use, cart first, then the links from the lowest up.
@@ -26,9 +27,13 @@ const TIMERS: [(*const u32, CounterWidth); SENSORS] = {
     timers
 };
 
-/// Address of a sensor's counter register, if the sensor is in use.
+/// Address of a sensor's counter register, if the sensor is in use: the cart's is not, where pulses move it.
 const fn counter(sensor: usize) -> Option<*const u32> {
-    if sensor < SENSORS { Some(TIMERS[sensor].0.wrapping_byte_add(CNT)) } else { None }
+    if sensor < SENSORS && !(GIVES_PULSES && sensor == 0) {
+        Some(TIMERS[sensor].0.wrapping_byte_add(CNT))
+    } else {
+        None
+    }
 }
 
 /// Widths of the counters in use.
@@ -36,7 +41,7 @@ pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
     let mut widths = [Bits16; SENSORS];
     let mut i = 0;
     while i < SENSORS {
-        widths[i] = TIMERS[i].1;
+        widths[i] = if GIVES_PULSES && i == 0 { Bits32 } else { TIMERS[i].1 };
         i += 1;
     }
     widths

@@ -9,6 +9,7 @@ mod memory;
 mod motor;
 mod pins;
 mod serial;
+mod steps;
 mod supply;
 mod ticks;
 mod watchdog;
@@ -25,8 +26,9 @@ use upright::protocol::message::Start;
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
 pub(crate) use memory::MemoryCheck;
-use motor::Motor;
+use motor::{GIVES_PULSES, Motor};
 pub(crate) use serial::{DmaBuffer, DmaLine};
+use steps::Steps;
 use supply::Supply;
 pub(crate) use ticks::TICK_US;
 use watchdog::Watchdog;
@@ -34,6 +36,8 @@ use watchdog::Watchdog;
 /// The pins and peripherals of the control task.
 pub(crate) struct F4Board {
     motor: Motor,
+    /// One, if the drive takes pulses.
+    steps: [Steps; GIVES_PULSES as usize],
     supply: Supply,
     exti: EXTI,
     power: PWR,
@@ -72,6 +76,7 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     let hardware = F4Board {
         motor,
+        steps: [const { Steps::new() }; GIVES_PULSES as usize],
         supply,
         exti: device.EXTI,
         power: device.PWR,
@@ -94,12 +99,17 @@ impl F4Board {
 
 impl Board<SENSORS> for F4Board {
     const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
+    const GIVES_PULSES: bool = GIVES_PULSES;
     /// See [`MemoryCheck`].
     const CHECKS_TABLES: bool = true;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         pins::show_tick(true);
-        let raw_counts = encoders::raw_counts();
+        let mut raw_counts = encoders::raw_counts();
+        let mut is_late = false;
+        if let ([steps], [pulses, ..]) = (self.steps.as_mut_slice(), raw_counts.as_mut_slice()) {
+            (*pulses, is_late) = (steps.given(), steps.was_late());
+        }
         // Clears the flag of the current tick.
         let _ = tick_is_due();
         let [limit_low, limit_high] = pins::limits();
@@ -115,7 +125,7 @@ impl Board<SENSORS> for F4Board {
                 emergency_stop: self.motor.was_stopped() | pins::emergency_stop(),
                 driver_fault: pins::driver_fault_was_reported(&self.exti) | pins::driver_fault(),
                 overrun: self.overrun,
-                clock_fault: self.clock_fault,
+                clock_fault: self.clock_fault | is_late,
                 board_fault: self.wrong_chip
                     | self.motor.has_failed()
                     | guard::supply_was_low(&self.power, &self.exti),
@@ -128,7 +138,10 @@ impl Board<SENSORS> for F4Board {
     }
 
     fn drive(&mut self, output: &Output) {
-        self.motor.drive(output);
+        match self.steps.as_mut_slice() {
+            [steps] => steps.drive(&mut self.motor, output),
+            _ => self.motor.drive(output),
+        }
     }
 
     /// Does not feed the watchdog after three late ticks in a row, which are a fault. (If it is not fed, the fastest

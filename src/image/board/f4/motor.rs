@@ -14,11 +14,15 @@
 
 use crate::pac::TIM1;
 use upright::board::Output;
+use upright::gains::TABLE;
 
 use super::boards::BOARD;
 use super::pins;
 use super::wiring::{Signal, wire_of};
 use crate::CYCLES_PER_TICK;
+
+/// Whether the drive of the gain table takes pulses, which `steps.rs` gives in place of the PWM.
+pub(super) const GIVES_PULSES: bool = TABLE.steps.is_some();
 
 /// Approximate PWM frequency (Hz): above hearing.
 const PWM_HZ: u32 = 20_000;
@@ -63,7 +67,7 @@ const MAIN_OUTPUT: u32 = 1 << 15;
 
 /// Timer 1 and the pins of the power stage.
 pub(super) struct Motor {
-    timer: TIM1,
+    pub(super) timer: TIM1,
     on: bool,
     failed: bool,
 }
@@ -87,14 +91,40 @@ impl Motor {
         self.failed
     }
 
-    /// Drives the motor for at most three ticks, or lets it coast.
-    pub(super) fn drive(&mut self, output: &Output) {
-        if output.enable && !self.on {
-            self.failed |= !is_set_up(&self.timer);
+    /// Whether the motor may be driven, if that is wanted; if not, lets it coast.
+    #[inline(always)]
+    pub(super) fn may_drive(&mut self, wanted: bool) -> bool {
+        if wanted && !self.on {
+            // Pulses change what is loaded.
+            self.failed |= !if GIVES_PULSES { is_routed(&self.timer) } else { is_set_up(&self.timer) };
         }
-        if !output.enable || self.failed {
+        if !wanted || self.failed {
             off(&self.timer);
             self.on = false;
+            return false;
+        }
+        true
+    }
+
+    /// Writes what the next update loads: PSC, ARR, RCR and CCR1. If a write is lost, lets the motor coast for good and
+    /// returns false.
+    pub(super) fn load(&mut self, [divider, reload, repetitions, compare]: [u32; 4]) -> bool {
+        let timer = &self.timer;
+        // SAFETY: values within the widths of the fields.
+        timer.psc().write(|w| unsafe { w.bits(divider) });
+        timer.arr().write(|w| unsafe { w.bits(reload) });
+        timer.rcr().write(|w| unsafe { w.bits(repetitions) });
+        timer.ccr1().write(|w| unsafe { w.bits(compare) });
+        self.failed |= timer.psc().read().bits() != divider
+            || timer.arr().read().bits() != reload
+            || timer.rcr().read().bits() != repetitions
+            || timer.ccr1().read().bits() != compare;
+        self.may_drive(true)
+    }
+
+    /// Drives the motor for at most three ticks, or lets it coast.
+    pub(super) fn drive(&mut self, output: &Output) {
+        if !self.may_drive(output.enable) {
             return;
         }
         let active = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
@@ -110,6 +140,12 @@ impl Motor {
         self.timer.cnt().write(|w| unsafe { w.bits(phase) });
         // In one-pulse mode the update may have stopped the timer.
         self.timer.cr1().write(|w| w.opm().set_bit().cen().set_bit());
+        self.turn_on();
+    }
+
+    /// Enables the power stage and its input.
+    #[inline(always)]
+    pub(super) fn turn_on(&mut self) {
         if !self.on {
             // Has no effect while the contact of the emergency stop is open.
             self.timer.bdtr().modify(|_, w| w.moe().set_bit());
@@ -133,9 +169,13 @@ impl Motor {
 /// Whether the timer holds what was written to it. A write can be lost: a period of 65 536 clocks instead would mean
 /// full force for any duty.
 fn is_set_up(timer: &TIM1) -> bool {
-    timer.arr().read().bits() == PERIOD - 1
-        && timer.rcr().read().bits() == PERIODS - 1
-        && timer.ccmr1_output().read().bits() == MODE
+    timer.arr().read().bits() == PERIOD - 1 && timer.rcr().read().bits() == PERIODS - 1 && is_routed(timer)
+}
+
+/// Whether mode, output and protection are those that were written.
+#[inline(always)]
+fn is_routed(timer: &TIM1) -> bool {
+    timer.ccmr1_output().read().bits() == MODE
         && timer.ccer().read().bits() == OUTPUT
         && timer.bdtr().read().bits() & !MAIN_OUTPUT == PROTECTION
 }

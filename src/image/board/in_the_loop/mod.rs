@@ -132,6 +132,8 @@ impl Board<SENSORS> for SimulatedPins {
         widths[0] = CounterWidth::Bits32;
         widths
     };
+    /// The host counts them.
+    const GIVES_PULSES: bool = true;
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         let begin = self.instructions();

@@ -128,12 +128,30 @@ keys! {
     }
 }
 
+/// How the dry friction of the simulated machine depends on travel and speed. A rig file has no key for it: its
+/// machine has the first. `upright coverage` simulates the others, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FrictionLaw {
+    /// An elasto-plastic bristle, which sticks.
+    #[default]
+    ElastoPlastic,
+    /// A bristle that always slides a little (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA
+    /// Journal 14(12), 1976). With an excess at rest it is the LuGre model (C. Canudas de Wit, H. Olsson, K. J. Åström,
+    /// P. Lischinsky, IEEE Trans. Automatic Control 40(3), 1995).
+    Dahl,
+    /// The Coulomb friction times the tanh of the speed, which is divided by that at which half of an excess at rest
+    /// would be left: a contact that never sticks.
+    Creeping,
+}
+
 /// How the simulated machine differs from the model, `[reality]`. It changes no gain, so it is not part of the rig's
 /// hash.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reality {
     /// Dry friction of joints and cart.
     pub friction: DryFriction,
+    /// The law of this dry friction.
+    pub friction_law: FrictionLaw,
     /// Air drag of the links.
     pub air_drag: AirDrag,
     /// Backlash and belt.
@@ -156,6 +174,7 @@ impl Default for Reality {
         }
         Self {
             friction: absent(),
+            friction_law: FrictionLaw::default(),
             air_drag: absent(),
             drive_train: absent(),
             driver: absent(),
@@ -185,6 +204,7 @@ pub(crate) fn reality(
     let table = node.table(&REALITY)?;
     let reality = Reality {
         friction: DryFriction::read(&table)?,
+        friction_law: FrictionLaw::default(),
         air_drag: AirDrag::read(&table)?,
         drive_train: DriveTrain::read(&table)?,
         driver: DriverFaults::read(&table)?,

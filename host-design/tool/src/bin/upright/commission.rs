@@ -71,7 +71,6 @@ pub(crate) struct CommissionCommand {
 impl CommissionCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("commission")?;
         commissionable(&rig)?;
         let text = std::fs::read_to_string(&self.rig)?;
         let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
@@ -178,7 +177,6 @@ impl CommissionCommand {
     fn true_machine(&self, rig: &Rig) -> Result<Rig, Failure> {
         let Some(path) = &self.machine else { return Ok(rig.clone()) };
         let machine = Rig::from_path(path)?;
-        machine.refuse_acceleration("commission")?;
         commissionable(&machine)?;
         let differs = |what: &str| {
             let [path, rig] = [path, &self.rig].map(|path: &PathBuf| Path::display(path));

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
-use upright_design::identify::{Coverage, Drawn, coverage};
+use upright_design::identify::{Coverage, Drawn, TrueFriction, coverage};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 
@@ -42,6 +42,9 @@ pub(crate) struct IdentifiedMachinesCommand {
     /// Seed of the machines
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Law of the machines' dry friction; the true value is that at high speed
+    #[arg(long, value_enum, default_value_t, value_name = "LAW")]
+    friction: Friction,
     /// Take the wiring from the file instead of identifying it; faster
     #[arg(long)]
     trust_wiring: bool,
@@ -50,6 +53,34 @@ pub(crate) struct IdentifiedMachinesCommand {
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// Law of the machines' dry friction.
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum Friction {
+    /// An elasto-plastic bristle, as [reality] has it
+    #[default]
+    File,
+    /// The same, 20 to 60 % larger at rest
+    Stribeck,
+    /// Without sticking: Coulomb friction times the tanh of the speed
+    Tanh,
+    /// Dahl's bristle
+    Dahl,
+    /// Dahl's bristle, 20 to 60 % larger at rest
+    Lugre,
+}
+
+impl From<Friction> for TrueFriction {
+    fn from(friction: Friction) -> Self {
+        match friction {
+            Friction::File => TrueFriction::OfFile,
+            Friction::Stribeck => TrueFriction::Stribeck,
+            Friction::Tanh => TrueFriction::Tanh,
+            Friction::Dahl => TrueFriction::Dahl,
+            Friction::Lugre => TrueFriction::LuGre,
+        }
+    }
 }
 
 fn below_90(text: &str) -> Result<f64, String> {
@@ -61,17 +92,18 @@ fn below_90(text: &str) -> Result<f64, String> {
 impl IdentifiedMachinesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("coverage")?;
         let drawn = Drawn {
             runs: u64::from(self.runs),
             off_percent: self.off,
             seconds: f64::from(self.seconds),
+            friction: self.friction.into(),
             seed: self.seed,
             trust_wiring: self.trust_wiring,
         };
+        let friction = self.friction.to_possible_value().map(|value| value.get_name().to_owned());
         let options = json!({
             "runs": self.runs, "off": self.off, "seconds": self.seconds, "seed": self.seed,
-            "trust_wiring": self.trust_wiring,
+            "trust_wiring": self.trust_wiring, "friction": friction,
         });
         let work = |study: &Study| -> Result<Coverage, Failure> {
             Ok(with_bar("machines", drawn.runs, |done| coverage(&rig, &drawn, study, done))?)

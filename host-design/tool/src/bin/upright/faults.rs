@@ -82,11 +82,6 @@ fn kind(name: &str) -> Result<Defect, String> {
 impl FaultsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        if self.shake {
-            rig.refuse_acceleration("faults --shake")?;
-        } else if self.target != TargetOption::Host {
-            rig.refuse_acceleration("faults --target")?;
-        }
         let table = if self.swing_up {
             with_stored_motions(&self.variation.rig, &rig, table, Wanted::SwingUp)?
         } else {

@@ -82,7 +82,6 @@ pub(crate) struct IdentifyCommand {
 impl IdentifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("identify")?;
         let recordings = Recordings::from_paths(&rig, &self.logs, &self.reading.reading())?;
         if let Some(path) = &self.csv {
             return convert(&rig, &recordings, path, |log, steps, out| log.write_csv(steps, out));

@@ -62,7 +62,6 @@ const LAST_WAIT: Duration = Duration::from_millis(500);
 impl ShakeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
-        rig.refuse_acceleration("shake")?;
         let log = self.shaken(&rig)?;
         write_atomically(&self.log, &log.to_bytes())?;
         let angles = log.deviations();

@@ -61,9 +61,6 @@ pub(crate) struct TwinCommand {
 impl TwinCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        if self.target != TargetOption::Host {
-            rig.refuse_acceleration("twin --target")?;
-        }
         let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
         let built = match self.port {
             None => Some(self.target.built(PinLink::Files, &rig, &table)?),

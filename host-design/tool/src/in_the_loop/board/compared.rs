@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use upright::board::Output;
+use upright::control::actuator::Drive;
 use upright_design::client::{AnyTelemetry, Client, Received};
 use upright_design::harness::{HarnessError, Pace, Pins, Target};
 
@@ -50,14 +51,18 @@ impl<'a> Compared<'a> {
         Self { board, host, received: Vec::new(), was_stopped: false, streams, ticks: 0, messages: 0 }
     }
 
-    /// Checks that the duty at the pins is that of the host, to the timer's clock.
-    fn compare_duty(&self, host: &Output) -> Result<(), HarnessError> {
+    /// Checks that the duty at the pins is that of the host, to the timer's clock; or that as many pulses came.
+    fn compare_output(&self, board: &Output, host: &Output) -> Result<(), HarnessError> {
         let stage = self.board.stage();
         if stage.enable != host.enable {
             return self
                 .differs(format!("enable is {} at the pin, {} on the host", stage.enable, host.enable));
         }
-        if !host.enable {
+        let pulses = [board.pulses(), host.pulses()];
+        if pulses[0] != pulses[1] {
+            return self.differs(format!("{} pulses at the pin, {} on the host", pulses[0], pulses[1]));
+        }
+        if !host.enable || matches!(host.drive, Drive::Steps(_)) {
             return Ok(());
         }
         let duty = host.duty;
@@ -125,7 +130,7 @@ impl Target for Compared<'_> {
         latched.contacts.emergency_stop |= stopped;
         let mut from_host = Vec::new();
         let host = self.host.tick(&latched, &mut from_host)?;
-        self.compare_duty(&host)?;
+        self.compare_output(&output, &host)?;
         self.streams[0].take(&serial[begin..]);
         self.streams[1].take(&from_host);
         self.compare_telemetry()?;

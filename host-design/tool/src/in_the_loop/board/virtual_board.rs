@@ -16,6 +16,8 @@ use upright_design::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
 
+use super::pulse_count::{PulseCount, PulseWatch};
+
 /// Inputs change this long before a tick.
 const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
 /// Events inside a tick happen this long after its beginning.
@@ -72,6 +74,8 @@ pub struct VirtualBoard {
     wiring: &'static BoardWiring,
     /// Force at full duty (N); `None` for a rig with motor data.
     pub(super) force_limit_n: Option<f32>,
+    /// The pulses of a drive that takes them.
+    pulses: Option<PulseCount>,
     tick_s: f64,
     /// Position of each encoder (edges).
     positions: Vec<i64>,
@@ -113,10 +117,15 @@ impl VirtualBoard {
         let mut board =
             SimulatedBoard::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
+        let pulses = table.steps.map(|_| PulseCount::default());
+        if pulses.is_some() {
+            board.record_pulses();
+        }
         let mut target = Self {
             board,
             wiring: conditions.wiring,
             force_limit_n: table.motor.is_none().then_some(table.force_limit_n),
+            pulses,
             tick_s: f64::from(table.tick_s),
             positions: vec![0; table.sensors()],
             counters: None,
@@ -161,6 +170,13 @@ impl VirtualBoard {
         self.stage
     }
 
+    /// Shows all pulses from now on to `watch`, tick by tick, if the drive takes pulses.
+    pub fn watch_pulses(&mut self, watch: PulseWatch) {
+        if let Some(pulses) = &mut self.pulses {
+            pulses.watch = Some(watch);
+        }
+    }
+
     /// Measures every tick from now on, with these places of the half-words: slower, but with the same results.
     pub(super) fn measure_ticks(&mut self, places: Vec<CodePlace>) {
         self.meter = Some(Meter::new(places));
@@ -181,7 +197,8 @@ impl VirtualBoard {
     /// with the tick before: the image looks for bytes after each tick.
     pub(super) fn latched(&self, pins: &Pins, received: &[u8]) -> Pins {
         let counts = (0..).zip(&self.positions).map(|(sensor, &position)| {
-            let count = position as u32;
+            let pulses = self.pulses.as_ref().filter(|_| sensor == 0);
+            let count = pulses.map_or(position as u32, |pulses| pulses.before);
             Bench::reading(sensor, count)
         });
         Pins {
@@ -372,6 +389,10 @@ impl Target for VirtualBoard {
             }
         }
         self.stage = self.board.power_stage();
+        let is_on = self.stage.enable && self.stage.main_output;
+        if let Some(pulses) = &mut self.pulses {
+            return Ok(pulses.take(begin + LEAD, &self.board.pulses(), is_on));
+        }
         let net = (after.along - before.along) as f64 - (after.against - before.against) as f64;
         let share = (net / (self.board.now() - begin) as f64) as f32;
         Ok(Output {
@@ -380,7 +401,7 @@ impl Target for VirtualBoard {
                 Some(limit_n) => Drive::Force(share * limit_n),
                 None => Drive::Duty(share),
             },
-            enable: self.stage.enable && self.stage.main_output && self.stage.runs,
+            enable: is_on && self.stage.runs,
         })
     }
 

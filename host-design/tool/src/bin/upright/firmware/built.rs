@@ -33,10 +33,9 @@ pub(super) fn built_for_pico(
     Ok(with_spinner("building the image", || image::build_pico(board, &rig, &table))?)
 }
 
-/// Reads this rig file and designs its table, with the stored motions. Refuses a drive that takes pulses.
+/// Reads this rig file and designs its table, with the stored motions.
 pub(super) fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
-    rig.refuse_acceleration("firmware")?;
     let table = table_of(&rig, path, wanted)?;
     Ok((rig, table))
 }

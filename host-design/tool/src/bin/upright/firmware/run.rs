@@ -72,7 +72,6 @@ impl RunCommand {
             });
         }
         self.simulate.run_with(|rig, table, scenario| {
-            rig.refuse_acceleration("firmware run")?;
             let recording = self.recorded([rig; 2], table, scenario)?;
             Ok((recording.trace, recording.summary))
         })

@@ -1,0 +1,52 @@
+//! Whether the cart's dry friction sticks, or is proportional to the speed near rest.
+
+use super::model::Model;
+use super::prediction::Filter;
+
+/// Speeds of the cart (m/s) with which the search begins, and the factors by which the best one is changed.
+const SPEEDS_M_PER_S: [f64; 4] = [0.001, 0.002, 0.004, 0.008];
+const FACTORS: [f64; 2] = [1.4, 1.15];
+/// Duration of the part of the record on which they are tried (s).
+const TRIAL_S: f64 = 20.0;
+/// Iterations of each fit.
+const ITERATIONS: usize = 2;
+/// Least fall of -2 ln L with which a cart that never sticks is believed.
+const LEAST_GAIN: f64 = 12.0;
+
+/// The model with the speed of the cart's `tanh` under which the measurements are most likely, and the parameters that
+/// were fitted with it; none if a bristle explains them as well.
+pub(super) fn found(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Option<(Model, Vec<f64>)> {
+    if filter.model.is_imposed {
+        return None;
+    }
+    let short = filter.record.part(0.0, TRIAL_S);
+    let with = |speed: f64| {
+        let mut model = filter.model.clone();
+        (model.creeping, model.excess[0]) = (Some(speed), 0.0);
+        model
+    };
+    let unfitted =
+        |speed: f64| Filter { model: &with(speed), record: &short, ..*filter }.run(p, noise, false).cost;
+    let fitted = |speed: f64, p: &[f64]| {
+        let model = with(speed);
+        let other = Filter { model: &model, record: &short, ..*filter };
+        other.fit(p, noise, ITERATIONS).map(|(p, normal)| (normal.cost, p))
+    };
+    let own = Filter { record: &short, ..*filter }.fit(p, noise, ITERATIONS)?.1.cost;
+    let first = SPEEDS_M_PER_S.map(|speed| (unfitted(speed), speed));
+    let (_, mut speed) = first.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let mut best = fitted(speed, p)?;
+    // Written so that NaN is not believed.
+    let is_better = best.0 < own;
+    if !is_better {
+        return None;
+    }
+    for factor in FACTORS {
+        for factor in [factor, 1.0 / factor] {
+            while let Some(other) = fitted(factor * speed, &best.1).filter(|other| other.0 < best.0) {
+                (speed, best) = (factor * speed, other);
+            }
+        }
+    }
+    (own - best.0 > LEAST_GAIN).then(|| (with(speed), best.1))
+}
