@@ -1,7 +1,8 @@
-//! Whether the cart's dry friction sticks, or is proportional to the speed near rest.
+//! The cart's dry friction, and whether it sticks or is proportional to the speed near rest.
 
 use super::model::Model;
 use super::prediction::Filter;
+use super::stribeck;
 
 /// Speeds of the cart (m/s) with which the search begins, and the factors by which the best one is changed.
 const SPEEDS_M_PER_S: [f64; 4] = [0.001, 0.002, 0.004, 0.008];
@@ -49,4 +50,16 @@ pub(super) fn found(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Option<(Mo
         }
     }
     (own - best.0 > LEAST_GAIN).then(|| (with(speed), best.1))
+}
+
+impl Model {
+    /// Dry friction of the cart at the speed `v` (m/s) with the deflection `bristle`, as a share of that in motion, and
+    /// its derivatives by speed and deflection.
+    pub(super) fn cart_friction(&self, v: f64, bristle: f64) -> [f64; 3] {
+        let [factor, by_speed] = stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v);
+        let Some(creeping) = self.creeping else { return [factor * bristle, by_speed * bristle, factor] };
+        let direction = libm::tanh(v / creeping);
+        let slope = (1.0 - direction * direction) / creeping;
+        [factor * direction, by_speed * direction + factor * slope, 0.0]
+    }
 }

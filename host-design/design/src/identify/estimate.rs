@@ -168,15 +168,17 @@ fn predicted(
     Ok(window_errors(model, priors, &[(&record, [&old, p])]))
 }
 
-/// The model with the friction laws under which the measurements are most likely.
-fn with_friction_laws(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Model {
+/// The model with the friction laws under which the measurements are most likely, and the parameters with them, from
+/// `p`.
+fn with_friction_laws(filter: &Filter<'_>, p: Vec<f64>, noise: &[f64]) -> (Model, Vec<f64>) {
     let mut model = filter.model.clone();
-    model.smoothing = filter.smoothing(p, noise);
+    model.smoothing = filter.smoothing(&p, noise);
     // With more links the search takes minutes.
     if model.layout.links <= 2 {
-        model.excess = at_rest::excess(&Filter { model: &model, ..*filter }, p, noise);
+        model.excess = at_rest::excess(&Filter { model: &model, ..*filter }, &p, noise);
     }
-    model
+    let creeping = creeping::found(&Filter { model: &model, ..*filter }, &p, noise);
+    creeping.unwrap_or((model, p))
 }
 
 /// The parts of the record, and the priors.
@@ -216,9 +218,7 @@ impl Fitted<'_> {
         let undetermined = || IdentifyError::Undetermined("the equations have no solution");
         let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
         // Noise and smoothing were tuned for the parameters before this fit.
-        let model = with_friction_laws(&filter, &p, &noise);
-        let creeping = creeping::found(&Filter { model: &model, ..filter }, &p, &noise);
-        let (model, p) = creeping.unwrap_or((model, p));
+        let (model, p) = with_friction_laws(&filter, p, &noise);
         found.doubts.extend(Doubt::of_excess(model.excess));
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);

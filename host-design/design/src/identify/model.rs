@@ -95,16 +95,6 @@ impl Model {
         p[self.layout.length(low)] * p[self.layout.first_moment(high)]
     }
 
-    /// Dry friction of the cart at the speed `v` (m/s) with the deflection `bristle`, as a share of that in motion, and
-    /// its derivatives by speed and deflection.
-    fn cart_friction(&self, v: f64, bristle: f64) -> [f64; 3] {
-        let [factor, by_speed] = stribeck::factor(self.excess[0], stribeck::SPEEDS[0], v);
-        let Some(creeping) = self.creeping else { return [factor * bristle, by_speed * bristle, factor] };
-        let direction = libm::tanh(v / creeping);
-        let slope = (1.0 - direction * direction) / creeping;
-        [factor * direction, by_speed * direction + factor * slope, 0.0]
-    }
-
     /// Friction in a joint of the state `at` that turns at `rate` (rad/s): torque (N·m), its derivative by the rate,
     /// and the tanh or the bristle deflection.
     fn friction(&self, p: &[f64], at: &[f64], joint: usize, rate: f64) -> [f64; 3] {
