@@ -3,7 +3,7 @@
 use super::program::is_there;
 use super::recorded::{BALANCING, ControllerTick, FAULT, FirmwareRun, scenario};
 use super::{STRICT, differing, first_difference, replayed};
-use crate::published::rig_and_table;
+use crate::published::{rig_and_table, table};
 use upright::control::actuator::Drive;
 use upright::control::controller::Controller;
 use upright::supervision::debounce::Debounce;
@@ -139,12 +139,16 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
 }
 
 #[test]
-fn pulses_have_the_bits_of_the_firmware_with_one_two_and_four_links() {
+fn pulses_have_the_bits_of_the_firmware_with_one_two_and_four_links_and_with_a_slow_servo() {
     if !is_there("gcc") {
         return;
     }
-    for name in ["single-stepper", "double-stepper", "quadruple-stepper"] {
-        let (rig, table) = rig_and_table(name);
+    let mut slow = rig_and_table("double-stepper").0.clone();
+    slow.actuator.acceleration.as_mut().unwrap().bandwidth_hz = Some(20.0);
+    let slow = (slow.clone(), table(&slow));
+    let ideal = ["single-stepper", "double-stepper", "quadruple-stepper"].map(rig_and_table);
+    for (rig, table) in ideal.into_iter().chain([&slow]) {
+        let name = &rig.name;
         let header = c_header(rig, table).unwrap();
         for (law, _) in table.laws.present() {
             let run = recorded_steps(rig, table, &scenario(rig, law, 10_000), nothing);

@@ -4,6 +4,7 @@ mod acceleration;
 mod acceleration_firmware;
 mod acceleration_imperfect;
 mod acceleration_motor;
+mod acceleration_servo;
 mod design_properties;
 mod homing;
 mod identify;

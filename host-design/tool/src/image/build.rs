@@ -175,6 +175,8 @@ mod tests {
             step_m: 5e-5,
             acceleration_limit_m_per_s2: 8.0,
             speed_limit_m_per_s,
+            lag_s: 0.0,
+            lead_s: 5e-3,
         };
         let refused =
             |tick_s, speed| check_board(feather, 2, tick_s, Some(&steps(speed))).unwrap_err().to_string();

@@ -13,7 +13,7 @@ use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
 use crate::published::rig_path;
-use crate::stepper_command::with_motor;
+use crate::stepper_command::{with_motor, with_slow_servo};
 
 fn upright(arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap();
@@ -237,7 +237,7 @@ fn explains(listed: &str, name: &str) -> bool {
 fn every_row_of_verify_is_explained() {
     let rig = rig_path("single-quanser-ip02");
     let folder = tempfile::tempdir().unwrap();
-    let reports = [rig.display().to_string(), with_motor(folder.path())]
+    let reports = [rig.display().to_string(), with_motor(folder.path()), with_slow_servo(folder.path())]
         .map(|rig| upright(&["verify", &rig, "--law", "lqr", "--runs", "1"]));
     // Two spaces, then the name in 26 columns; a line without a name continues the one above.
     let names: Vec<&str> = reports

@@ -21,6 +21,32 @@ pub(crate) fn with_motor(folder: &Path) -> String {
     file.display().to_string()
 }
 
+/// Writes the double stepper with a servo of 5 Hz into `folder`; returns the file.
+pub(crate) fn with_slow_servo(folder: &Path) -> String {
+    let rig = std::fs::read_to_string(rig_path("double-stepper")).unwrap();
+    let file = folder.join("servo.toml");
+    std::fs::write(
+        &file,
+        rig.replace("kind = \"acceleration\"", "kind = \"acceleration\"\nbandwidth_hz = 5"),
+    )
+    .unwrap();
+    file.display().to_string()
+}
+
+#[test]
+fn a_servo_of_another_bandwidth_than_the_design_can_bear_is_warned_about() {
+    let folder = tempfile::tempdir().unwrap();
+    let warned = |real: &str| {
+        let file = with_slow_servo(folder.path());
+        let rig = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, format!("{rig}\n[reality]\nbandwidth_hz = {real}\n")).unwrap();
+        stderr(&upright(&["design", &file, "--no-write"]))
+            .contains("give the servo's real bandwidth in [actuator]")
+    };
+    assert!(warned("3") && warned("20"));
+    assert!(!warned("6"));
+}
+
 #[test]
 fn check_design_simulate_and_export_serve_a_stepper() {
     let rig = stepper();

@@ -139,26 +139,27 @@ pub(super) fn warnings(
         warnings
             .push("no force limit: give actuator.force_limit_n or a motor before connecting one".to_owned());
     }
-    let limits = DriveLimits::of(rig, &certified.double);
-    let motor = StepMotor::of(rig).zip(rig.chain()).and_then(|(motor, chain)| motor.resonance_hz(chain));
-    let least_hz = limits.and_then(|limits| limits.resonance_hz);
-    if let Some((found_hz, least_hz)) = motor.zip(least_hz).filter(|(found_hz, least_hz)| found_hz < least_hz)
-    {
-        warnings.push(format!(
-            "the motor of [reality] resonates with the cart at {found_hz:.0} Hz, below the {least_hz:.0} Hz that the loop \
-             needs: take a stronger motor, a lighter cart or less acceleration"
-        ));
-    }
-    if let (Some(found_hz), Some(limits)) = (rig.reality.step_motor.bandwidth_hz, limits)
-        && !limits.bandwidths_hz().contains(&found_hz)
-    {
-        warnings.push(format!(
-            "the servo of [reality] has a bandwidth of {found_hz} Hz; the loop needs {limits}: give the servo's real \
-             bandwidth in [actuator] (bandwidth_hz)"
-        ));
-    }
+    warnings.extend(warning_of_drive(rig, certified));
     if reports.is_empty() {
         warnings.push("the rig file asks for no control law: add [lqr] or [pole_placement]".to_owned());
     }
     warnings
+}
+
+/// What is wrong with the drive of the real machine, as `[reality]` describes it.
+fn warning_of_drive(rig: &Rig, certified: &Certified) -> Option<String> {
+    let limits = DriveLimits::of(rig, &certified.double)?;
+    let motor = StepMotor::of(rig).zip(rig.chain()).and_then(|(motor, chain)| motor.resonance_hz(chain));
+    if let Some((found_hz, least_hz)) = motor.zip(limits.resonance_hz).filter(|(found, least)| found < least)
+    {
+        return Some(format!(
+            "the motor of [reality] resonates with the cart at {found_hz:.0} Hz, below the {least_hz:.0} Hz that the loop \
+             needs: take a stronger motor, a lighter cart or less acceleration"
+        ));
+    }
+    let found_hz = rig.reality.step_motor.bandwidth_hz.filter(|hz| !limits.bandwidths_hz().contains(hz))?;
+    Some(format!(
+        "the servo of [reality] has a bandwidth of {found_hz} Hz; the loop needs {limits}: give the servo's real bandwidth \
+         in [actuator] (bandwidth_hz)"
+    ))
 }
