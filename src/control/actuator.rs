@@ -53,6 +53,7 @@ impl Drive {
 impl<T: Scalar> StepMap<T> {
     /// The acceleration nearest to `wanted` (m/s²) that is within the limits of the drive for a tick of `tick_s` (s),
     /// which begins at `speed` (m/s).
+    #[inline(never)]
     pub fn limited(&self, wanted: T, speed: T, tick_s: T) -> T {
         let limited = saturate(wanted, self.acceleration_limit_m_per_s2);
         // A drive with lag is commanded more than the speed after the tick.

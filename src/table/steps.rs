@@ -24,6 +24,7 @@ part! {
 
 impl<T: Scalar> StepMap<T> {
     /// The step nearest to a position (m), counted from 0; none if the position is not a number or beyond all counts.
+    #[inline(never)]
     pub fn nearest(&self, position: T) -> Option<i32> {
         let steps = (position / self.step_m).to_f32();
         let rounded = (steps + f32::copysign(0.5, steps)) as i32;

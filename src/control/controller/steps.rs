@@ -27,6 +27,8 @@ impl<const NX: usize, const NY: usize, T: Scalar> Controller<'_, NX, NY, T> {
 
     /// The sensor of a cart that pulses move counts the pulses: subtracts how far the command is ahead of the cart at
     /// the predicted speed (m).
+    // Called in three places, and only without plain laws: one copy.
+    #[inline(never)]
     pub(super) fn subtract_lead(&self, y: &mut [T; NY]) {
         if let (Some(steps), Some(cart)) = (&self.table.steps, y.first_mut()) {
             *cart -= steps.lag_s * self.speed();
@@ -35,6 +37,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> Controller<'_, NX, NY, T> {
 
     /// Where the cart of a drive with lag is after this tick (m): within a tick its acceleration decays. None for other
     /// drives, whose acceleration is constant.
+    #[inline(never)]
     pub(super) fn cart_after_lag(&self) -> Option<T> {
         let steps = self.table.steps.as_ref().filter(|steps| steps.lag_s > T::default())?;
         let mean = self.speed() + self.applied * (steps.lead_s - steps.lag_s);
