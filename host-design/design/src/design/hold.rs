@@ -22,10 +22,10 @@ pub(crate) enum Hold {
 impl Hold {
     /// That of the rig's drive.
     pub(crate) fn of(rig: &Rig) -> Self {
-        match rig.actuator.acceleration.as_ref().map(|drive| drive.lag_s()) {
+        match &rig.actuator.acceleration {
             None => Self::Constant,
-            Some(0.0) => Self::MeanSpeed,
-            Some(lag_s) => Self::Lag(lag_s),
+            Some(drive) if drive.bandwidth_hz.is_none() => Self::MeanSpeed,
+            Some(drive) => Self::Lag(drive.lag_s()),
         }
     }
 

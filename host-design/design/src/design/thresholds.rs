@@ -86,7 +86,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
         // The prediction moves by up to a step between two pulses; the rest is for its rounding.
         frozen[0] *= 1.5;
         // While the command of a drive with lag stands still, its cart may move.
-        if rig.actuator.acceleration.as_ref().is_some_and(|drive| drive.lag_s() > 0.0) {
+        if rig.actuator.acceleration.as_ref().is_some_and(|drive| drive.bandwidth_hz.is_some()) {
             frozen[0] = f64::INFINITY;
         }
     }

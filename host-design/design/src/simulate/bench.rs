@@ -386,11 +386,7 @@ fn pulses_at(state: &[f64], step_m: Option<f64>, servo_lag_s: Option<f64>) -> i6
 /// The lag (s) of a servo in the real machine; none if it follows at once, or if its motor is described.
 fn servo_lag_s(rig: &Rig) -> Option<f64> {
     let described = rig.actuator.acceleration.as_ref()?;
-    let real = AccelerationDrive {
-        bandwidth_hz: rig.reality.step_motor.bandwidth_hz.or(described.bandwidth_hz),
-        ..described.clone()
-    };
-    Some(real.lag_s()).filter(|&lag_s| lag_s > 0.0)
+    rig.reality.step_motor.bandwidth_hz.or(described.bandwidth_hz).map(AccelerationDrive::lag_at)
 }
 
 /// The nearest integer; of two equally near ones, that away from 0.

@@ -156,6 +156,7 @@ pub(super) fn images() -> Result<PathBuf, BuildError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::pico_limits::tests::stepper;
     use super::*;
 
     #[test]
@@ -171,16 +172,9 @@ mod tests {
         for tick_s in [1.2e-4, f64::from(1.2e-4_f32), 1e-3, 0.033, f64::from(0.033_f32)] {
             assert!(check_board(feather, 2, tick_s, None).is_ok(), "{tick_s}");
         }
-        let steps = |speed_limit_m_per_s| StepMap {
-            step_m: 5e-5,
-            acceleration_limit_m_per_s2: 8.0,
-            speed_limit_m_per_s,
-            lag_s: 0.0,
-            lead_s: 5e-3,
-        };
         let refused =
-            |tick_s, speed| check_board(feather, 2, tick_s, Some(&steps(speed))).unwrap_err().to_string();
-        assert!(check_board(feather, 2, 1e-2, Some(&steps(1.2))).is_ok());
+            |tick_s, speed| check_board(feather, 2, tick_s, Some(&stepper(speed))).unwrap_err().to_string();
+        assert!(check_board(feather, 2, 1e-2, Some(&stepper(1.2))).is_ok());
         let too_many = refused(1e-2, 1.3);
         assert!(too_many.contains("25500 step pulses") && too_many.contains("26000"), "{too_many}");
         assert!(refused(1e-3, 10.5).contains("200000 step pulses"), "{}", refused(1e-3, 10.5));

@@ -115,8 +115,19 @@ pub(super) fn check(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// A drive of 20 pulses per mm with this speed limit, in ticks of 10 ms.
+    pub(in crate::image) fn stepper(speed_limit_m_per_s: f32) -> StepMap {
+        StepMap {
+            step_m: 5e-5,
+            acceleration_limit_m_per_s2: 8.0,
+            speed_limit_m_per_s,
+            lag_s: 0.0,
+            lead_s: 5e-3,
+        }
+    }
 
     #[test]
     fn what_a_pico_cannot_do_is_refused_with_the_numbers() {
@@ -133,17 +144,10 @@ mod tests {
         assert!(four_links.contains("--no-motions"), "{four_links}");
         assert_eq!(check(PicoBoard::Pico, 5, 5e-4, false, None), Ok(()));
         assert_eq!(check(PicoBoard::Pico2, 5, 1e-3, true, None), Ok(()));
-        let steps = |speed_limit_m_per_s| StepMap {
-            step_m: 5e-5,
-            acceleration_limit_m_per_s2: 8.0,
-            speed_limit_m_per_s,
-            lag_s: 0.0,
-            lead_s: 5e-3,
-        };
-        assert_eq!(check(PicoBoard::Pico, 2, 1e-2, false, Some(&steps(5.0))), Ok(()));
-        let fast = check(PicoBoard::Pico, 2, 1e-2, false, Some(&steps(15.0))).unwrap_err().to_string();
+        assert_eq!(check(PicoBoard::Pico, 2, 1e-2, false, Some(&stepper(5.0))), Ok(()));
+        let fast = check(PicoBoard::Pico, 2, 1e-2, false, Some(&stepper(15.0))).unwrap_err().to_string();
         assert!(fast.contains("200000 step pulses") && fast.contains("300000"), "{fast}");
-        let slow_tick = check(PicoBoard::Pico, 2, 0.1, false, Some(&steps(5.0))).unwrap_err().to_string();
+        let slow_tick = check(PicoBoard::Pico, 2, 0.1, false, Some(&stepper(5.0))).unwrap_err().to_string();
         assert!(slow_tick.contains("40950 step pulses"), "{slow_tick}");
         let too_many = check(PicoBoard::Pico2, 6, 1e-3, false, None).unwrap_err().to_string();
         assert!(too_many.starts_with("pico2 counts 5 encoders"), "{too_many}");

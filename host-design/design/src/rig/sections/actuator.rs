@@ -82,7 +82,12 @@ keys! {
 impl AccelerationDrive {
     /// Time constant (s) with which it follows its speed; 0 without a bandwidth.
     pub fn lag_s(&self) -> f64 {
-        self.bandwidth_hz.map_or(0.0, |hz| 1.0 / (core::f64::consts::TAU * hz))
+        self.bandwidth_hz.map_or(0.0, Self::lag_at)
+    }
+
+    /// Time constant (s) of a lag of first order with this bandwidth (Hz).
+    pub(crate) fn lag_at(bandwidth_hz: f64) -> f64 {
+        1.0 / (core::f64::consts::TAU * bandwidth_hz)
     }
 
     /// Speed above that of the cart which is commanded per acceleration (s), see [`StepMap`](upright::table::StepMap).
