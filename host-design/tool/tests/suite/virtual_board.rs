@@ -7,7 +7,7 @@ use upright::gains::RIG_HASH;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::table::Law;
-use upright_board::{Chip, Conditions, Crystal, Image, pin};
+use upright_board::{Chip, Conditions, Crystal, Image, Pulse, UNITS_PER_MICROSECOND as US, pin};
 use upright_design::design::design;
 use upright_design::harness::{Pins, Session};
 use upright_design::rig::{Integral, Rig};
@@ -69,6 +69,41 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
     let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
     assert!(error.contains("differ"), "{error}");
+}
+
+/// Every tick restarts the PWM's timer for three ticks.
+#[test]
+fn restarts_of_the_pwm_fall_at_one_place_of_its_period_and_cut_no_pulse() {
+    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
+    let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
+    scenario.start[2] = 0.002;
+    scenario.duration_s = 2.0;
+    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+    board.board().record_pulses();
+    run_compared(&rig, &table, &scenario, &mut board).unwrap();
+    let mut pulses = board.board().pulses();
+    assert!(pulses.len() > 40_000, "{}", pulses.len());
+    assert_eq!(cuts(&pulses), 0);
+    // Balancing: the ends of all pulses are at one place of the period of 50 µs, to the time that a tick varies by.
+    let ends =
+        pulses[pulses.len() / 2..].iter().filter_map(|pulse| Some((pulse.at + pulse.width?) % (50 * US)));
+    let [first, last] = [ends.clone().min().unwrap(), ends.max().unwrap()];
+    assert!(last - first < US / 2, "{first} {last}");
+    // Negative control: a pulse that is interrupted for 0.12 µs.
+    let whole = pulses.iter().rposition(|pulse| pulse.width > Some(US)).unwrap();
+    let (at, half) = (pulses[whole].at, pulses[whole].width.unwrap() / 2);
+    pulses[whole].width = Some(half);
+    pulses.insert(whole + 1, Pulse { at: at + half + 3 * US / 25, ..pulses[whole] });
+    assert_eq!(cuts(&pulses), 1);
+}
+
+/// How many pulses of a PWM follow one another within half a microsecond, in which no power stage can switch.
+fn cuts(pulses: &[Pulse]) -> usize {
+    let is_cut =
+        |pair: &&[Pulse]| pair[0].width.is_some_and(|width| pair[1].at - pair[0].at - width < US / 2);
+    pulses.windows(2).filter(is_cut).count()
 }
 
 /// The supply of the chip is too low for the wait states that the image sets.

@@ -6,8 +6,9 @@
 //! compare value (17.3.9). The compare value is never 0 here, so the output stops inactive. This needs no code and no
 //! other clock.
 //!
-//! A restart sets the counter to 0, which would cut a period short. So the counter is set back to where it was: the
-//! PWM keeps its phase, however much the time from the tick to the restart varies.
+//! A restart sets the counter to 0, which would cut a period short. So the counter is set back to where it was, or a
+//! little nearer to where it is wanted at a restart: the time that a restart takes is not known to the clock, and what
+//! it is off by would add up until restarts fall into the pulses, and cut them.
 //!
 //! The emergency stop is the timer's break input: it switches the output off in hardware (17.3.12). Only code can
 //! switch the output on again, once the contact is closed.
@@ -46,11 +47,13 @@ const PERIODS: u32 = 3 * PERIODS_PER_TICK;
 /// Shortest inactive time of the output in each period (timer clocks): power stages with a bootstrap supply need the
 /// pause, and none can follow a pause of nanoseconds. The duty is at most 98 %.
 const LEAST_PAUSE: u32 = PERIOD / 50;
-/// Counter at the first start. Later restarts fall at about the same place in the period, where the output is inactive
-/// up to a duty of three quarters.
-const FIRST_PHASE: u32 = PERIOD / 5;
-/// Timer clocks from reading the counter to starting it again.
+/// Counter wanted at a restart: the output is inactive there up to a duty of three quarters. Above it, a restart
+/// interrupts a pulse for about `RESTART`, 0.12 µs.
+const WANTED_PHASE: u32 = PERIOD / 5;
+/// Timer clocks from reading the counter to starting it again, about.
 const RESTART: u32 = 20;
+/// Largest change of the phase in a tick (timer clocks), more than the restart's time is off by.
+const LARGEST_SHIFT: u32 = PERIOD / 128;
 
 /// OC1M = 111, PWM mode 2; OC1PE: compare values change with a restart, not within a period (17.4.7).
 const MODE: u32 = 0b111 << 4 | 1 << 3;
@@ -129,13 +132,14 @@ impl Motor {
         }
         let active = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
         self.timer.ccr1().write(|w| unsafe { w.bits(PERIOD - active.min(PERIOD - LEAST_PAUSE)) });
-        let phase = if self.on { self.timer.cnt().read().bits() } else { FIRST_PHASE };
+        let phase = if self.on { self.timer.cnt().read().bits() } else { WANTED_PHASE };
+        let nearer = WANTED_PHASE.clamp(phase.saturating_sub(LARGEST_SHIFT), phase + LARGEST_SHIFT);
         // The update loads the compare value and the repetition counter and sets the counter to 0 (17.4.6: UG), where
         // the output is inactive: a safe moment to change the direction.
         self.timer.egr().write(|w| w.ug().set_bit());
         pins::push_along_x(output.duty > 0.0);
         // Never beyond the period: the counter would run on to the end of its range, with the output active.
-        let phase = phase + RESTART;
+        let phase = nearer + RESTART;
         let phase = if phase < PERIOD { phase } else { 0 };
         self.timer.cnt().write(|w| unsafe { w.bits(phase) });
         // In one-pulse mode the update may have stopped the timer.
