@@ -7,6 +7,7 @@
 //! - [`StepMotor`]: the spring between field and rotor of a step motor.
 //! - [`Timing`]: when the force of a tick begins and ends.
 //! - [`RealEncoders`]: errors of encoders and of their zeros.
+//! - [`drawn_machine`], [`corner_machine`]: machines within the tolerances of `[robust]`.
 //!
 //! What a rig file leaves out is not simulated: the simulation then does the same operations as without `[reality]`,
 //! and has the same bits. `docs/reality.md` describes the keys.
@@ -19,6 +20,7 @@ mod machine;
 mod parameters;
 mod step_motor;
 mod timing;
+mod tolerated;
 
 pub use belt::{Belt, Rotor};
 pub use bristle::{Bristle, Contact, PRESLIDING_PER_DEFLECTION};
@@ -28,3 +30,5 @@ pub use machine::{RealChain, ideal_chain, real_plant};
 pub use parameters::real_chain;
 pub use step_motor::StepMotor;
 pub use timing::Timing;
+pub(crate) use tolerated::first_mass;
+pub use tolerated::{corner_machine, corners_of, drawn_machine, tolerated_machine};

@@ -1,23 +1,19 @@
 //! Rate of false alarms: hours of balancing with the whole firmware on machines without a defect.
 
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::table::Law;
 
-use super::judge::machine;
 use crate::harness::{Harness, HarnessError, with_firmware};
-use crate::rig::{PerJoint, Rig};
+use crate::reality::{corner_machine, corners_of, drawn_machine};
+use crate::rig::Rig;
 use crate::study::Study;
 use crate::table::TableValues;
-use crate::verify::{VerifyError, at_rest_disturbed, chain, first_mass};
+use crate::verify::{VerifyError, at_rest_disturbed, chain, moved_setpoint_m};
 
 /// Time after which the set-point changes sides (s).
 const SIDE_S: f64 = 60.0;
-/// Largest distance of the set-point from the middle (m).
-const SETPOINT_M: f64 = 0.1;
 
 /// Result of balancing one machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,7 +50,7 @@ pub struct FalseAlarms {
 /// Which machines balance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Machines {
-    /// This many, drawn within `[robust]`: [`healthy_machine`].
+    /// This many, drawn within `[robust]`: [`drawn_machine`].
     Drawn(u64),
     /// One at each combination of wrong masses: [`corner_machine`].
     Corners,
@@ -65,56 +61,16 @@ impl Machines {
     pub fn count(self, rig: &Rig) -> u64 {
         match self {
             Self::Drawn(runs) => runs,
-            Self::Corners => rig.chain().map_or(0, |chain| 2 << (chain.links.len() - first_mass(rig))),
+            Self::Corners => corners_of(rig),
         }
     }
 
     fn machine(self, rig: &Rig, number: u64) -> Rig {
         match self {
-            Self::Drawn(_) => healthy_machine(rig, number),
+            Self::Drawn(_) => drawn_machine(rig, number),
             Self::Corners => corner_machine(rig, number),
         }
     }
-}
-
-/// Machine of the run with this number: drawn within `[robust]`, or, if the rig file has none, the machine of
-/// `[reality]`.
-///
-/// Friction, zero errors and latency are the same share of their tolerances, drawn uniformly from 0 to 1. The error of
-/// each mass is drawn uniformly within its tolerance.
-pub fn healthy_machine(rig: &Rig, number: u64) -> Rig {
-    let (Some(tolerances), Some(chain)) = (&rig.robust, rig.chain()) else {
-        return rig.clone();
-    };
-    let mut random = Pcg64::seed_from_u64(number);
-    let mut machine = machine(rig, tolerances, random.random_range(0.0..=1.0));
-    let percent = tolerances.mass_percent;
-    let mut wrong = || percent * random.random_range(-1.0..=1.0);
-    let parameters = &mut machine.reality.parameters;
-    parameters.cart_mass_percent = wrong();
-    parameters.link_mass_percent = PerJoint::each(chain.links.iter().map(|_| wrong()).collect());
-    machine
-}
-
-/// Machine at the combination of wrong masses with this number, with the full tolerances of `[robust]` for friction,
-/// zero errors and latency.
-///
-/// The cart is too heavy if the lowest bit of the number is set, the first link if the next is, and so on. Where the
-/// drive imposes the cart's acceleration, the lowest bit belongs to the first link.
-pub fn corner_machine(rig: &Rig, number: u64) -> Rig {
-    let (Some(tolerances), Some(chain)) = (&rig.robust, rig.chain()) else {
-        return rig.clone();
-    };
-    let mut machine = machine(rig, tolerances, 1.0);
-    let percent = tolerances.mass_percent;
-    let first = first_mass(rig);
-    let wrong = |part: usize| if number >> (part - first) & 1 == 1 { percent } else { -percent };
-    let parameters = &mut machine.reality.parameters;
-    if first == 0 {
-        parameters.cart_mass_percent = wrong(0);
-    }
-    parameters.link_mass_percent = PerJoint::each((1..=chain.links.len()).map(wrong).collect());
-    machine
 }
 
 /// Balances `machines` for `seconds` each, a part of `study`. `done` is called after each, from any thread.
@@ -189,8 +145,7 @@ fn balanced(
 ) -> Result<Healthy, HarnessError> {
     let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
     let (side, keep_alive) = (ticks(SIDE_S).max(1), ticks(KEEP_ALIVE.as_secs_f64()).max(1));
-    let [low, high] = table.limits.rail_m.map(f64::from);
-    let setpoint_m = SETPOINT_M.min(0.5 * high.min(-low)) as f32;
+    let setpoint_m = moved_setpoint_m(table) as f32;
     let thresholds = &table.thresholds;
     let largest = if thresholds.survives_pushes() { &thresholds.push } else { &thresholds.innovation };
     let mut found = Healthy { balanced_s: 0.0, fault: None, rejected: 0, closest: 0.0 };

@@ -4,11 +4,12 @@ use serde::{Deserialize, Serialize};
 use upright::table::Law;
 
 use crate::plant::absolute_angles;
-use crate::rig::{PerJoint, Rig, Tolerances};
+use crate::reality::tolerated_machine;
+use crate::rig::{Rig, Tolerances};
 use crate::simulate::{FallKind, Scenario, SimulationError, run};
 use crate::study::{Study, infinite_if_null};
 use crate::table::TableValues;
-use crate::verify::{CornerSettings, Disturbance, VerifyError, corners, disturbed, leaning, waking_lean};
+use crate::verify::{Disturbance, VerifyError, corner_noise, disturbed, leaning, waking_lean};
 
 /// Shares of the tolerances that are tried. A loop may survive with much friction and fall with little.
 pub(super) const SHARES: [f64; 4] = [0.0, 0.5, 1.0, 1.25];
@@ -60,8 +61,8 @@ pub struct Judgement {
     pub law: Law,
     /// Runs with friction, zero errors and latency together, beginning with none of them.
     pub machines: Vec<Runs>,
-    /// Combinations of mass errors, without friction: how many there are and how many survive.
-    pub corners: Option<[usize; 2]>,
+    /// Combinations of mass errors, with all other tolerances: how many there are and how many survive.
+    pub corners: Option<[u64; 2]>,
 }
 
 impl Judgement {
@@ -90,7 +91,7 @@ pub fn judge(
         return Err(VerifyError::Setting { what, value, accepts });
     }
     let machines = SHARES.into_iter().map(|share| {
-        let machine = machine(rig, tolerances, share);
+        let machine = tolerated_machine(rig, tolerances, share);
         let of_number = |number: u64| -> Result<JudgedRun, VerifyError> {
             Ok(one(&machine, table, law, settings, number + 1)?)
         };
@@ -99,25 +100,13 @@ pub fn judge(
     });
     let machines = machines.collect::<Result<_, VerifyError>>()?;
     let corners = if tolerances.mass_percent > 0.0 && !study.is_shard() {
-        let settings = CornerSettings { disturbance: settings.disturbance, ..CornerSettings::of(rig) };
-        let ideal = machine(rig, tolerances, 0.0);
-        let found = corners(&ideal, table, law, tolerances.mass_percent, &settings)?;
-        Some([found.corners, found.survived])
+        let tolerating = Rig { robust: Some(tolerances.clone()), ..rig.clone() };
+        let found = corner_noise(&tolerating, table, law, &settings.disturbance)?;
+        Some([found.runs, found.survived])
     } else {
         None
     };
     Ok(Judgement { law, machines, corners })
-}
-
-/// The rig with `share` of the tolerances for friction, zeros and latency, and with its own masses.
-pub(super) fn machine(rig: &Rig, tolerances: &Tolerances, share: f64) -> Rig {
-    let mut rig = rig.clone();
-    let (real, tolerances) = (&mut rig.reality, tolerances.scaled(share));
-    real.friction.joint_friction_n_m = PerJoint::all(tolerances.joint_friction_n_m);
-    real.friction.cart_friction_n = tolerances.cart_friction_n;
-    real.sensors.homing_error_rad = PerJoint::all(tolerances.homing_error_rad);
-    real.driver.latency_s = tolerances.latency_s;
-    rig
 }
 
 /// Result of one run.

@@ -4,10 +4,11 @@ use crate::design::{
     Design, DesignError, Hold, Kalman, continuous_plant, integrated_quadratic, lag_s, noise_columns, with_lag,
 };
 use crate::numerics::Matrix;
+use crate::reality::first_mass;
 use crate::rig::{Rig, Tolerances};
 use crate::verify::{
-    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, first_mass, radius,
-    stationary, wrong_masses,
+    ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary,
+    wrong_masses,
 };
 
 /// Least distance of the spectral radius from 1: a loop closer to instability falls in a long run.

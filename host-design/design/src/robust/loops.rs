@@ -6,10 +6,11 @@ use upright::table::Law;
 
 use super::candidate::{Candidate, candidates, joint_noises};
 use super::error::RobustError;
-use super::judge::{JudgeSettings, SHARES, machine, one};
+use super::judge::{JudgeSettings, SHARES, one};
 use super::linear::LinearPlants;
 use crate::design::{Certified, Uncertified};
 use crate::parallel::{self, Progress, ProgressStep};
+use crate::reality::tolerated_machine;
 use crate::rig::{Rig, Tolerances};
 use crate::table::TableValues;
 use crate::verify::{ControllerModel, PlantModel};
@@ -198,7 +199,7 @@ impl<'a> CandidateLoops<'a> {
         let settings = JudgeSettings { duration_s: SHORT_RUN_S, ..*self.settings };
         // The largest share first: most candidates fall there, and early.
         for share in SHARES.into_iter().rev() {
-            let real = machine(&rig, &tolerances, share);
+            let real = tolerated_machine(&rig, &tolerances, share);
             let outcome = one(&real, &table, self.pools[at[0]].law, &settings, 1)?;
             trial.survived_s += outcome.survived_s;
             if outcome.ended_by.is_some() {

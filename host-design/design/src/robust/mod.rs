@@ -36,9 +36,7 @@ mod search;
 
 pub use candidate::{Candidate, LawNumbers};
 pub use error::RobustError;
-pub use false_alarms::{
-    FalseAlarms, Healthy, Machines, balance, corner_machine, false_alarms, healthy_machine,
-};
+pub use false_alarms::{FalseAlarms, Healthy, Machines, balance, false_alarms};
 pub use file::{rewritten, set_tolerances};
 pub use front::{Front, FrontPoint, LawRipple, LeastRipple};
 pub use judge::{JudgeSettings, Judgement, Runs, judge};

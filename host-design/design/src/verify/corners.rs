@@ -7,7 +7,8 @@ use super::error::{VerifyError, chain, within};
 use super::trial::{Disturbance, Horizon, Outcome, disturbed, edge, leaning, trial, trials};
 use crate::parallel;
 use crate::plant::LANES;
-use crate::rig::{CartInput, Rig};
+use crate::reality::first_mass;
+use crate::rig::Rig;
 use crate::simulate::{Scenario, SimulationError};
 use crate::table::TableValues;
 
@@ -88,11 +89,6 @@ pub fn wrong_masses(rig: &Rig, percent: f64, factors: &[f64]) -> Rig {
         chain.links.iter_mut().zip(links).for_each(|(link, factor)| change(&mut link.mass_kg, factor));
     }
     wrong
-}
-
-/// The first part whose mass matters (0: cart): a drive that imposes the cart's acceleration does not feel its mass.
-pub(crate) fn first_mass(rig: &Rig) -> usize {
-    usize::from(rig.actuator.input() == CartInput::Acceleration)
 }
 
 fn run_of(rig: &Rig, law: Law, settings: &CornerSettings) -> Scenario {

@@ -41,11 +41,10 @@ mod rows;
 mod tick;
 mod trial;
 
-pub(crate) use corners::first_mass;
 pub(crate) use covariance::stationary;
 pub(crate) use error::chain;
 pub(crate) use loop_model::{Numbers, radius};
-pub(crate) use trial::{disturbed, leaning, waking_lean};
+pub(crate) use trial::{disturbed, leaning, moved_setpoint_m, waking_lean};
 
 pub use attraction::{
     Attraction, AttractionSettings, Edge, Map, MapAxis, Tilt, WorstTilt, attraction, attraction_map,
@@ -70,11 +69,11 @@ pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
 pub use monte_carlo::{Effort, MonteCarlo, Spread, WorstCase, monte_carlo, sample, spread, wilson};
-pub use noise_runs::{Endurance, MeasuredRipple, NoiseRun, endurance, noise_run};
+pub use noise_runs::{Endurance, LimitShare, MeasuredRipple, NoiseRun, corner_noise, endurance, noise_run};
 pub use pushes::{PushSearch, PushSurvival, pushes};
 pub use report::{Check, LawTrust, TrustReport, brief, trust};
 pub use response::Response;
 pub use rounding::Rounding;
 pub use rows::{FoundRow, TrustQuantity, quantities, rows};
 pub use tick::TickLimits;
-pub use trial::{Disturbance, Horizon, Outcome, at_rest_disturbed, trial, trials};
+pub use trial::{Disturbance, Horizon, Outcome, at_rest_disturbed, moving, trial, trials};

@@ -1,22 +1,27 @@
 //! Ripple and endurance under encoder resolution and disturbances, in long runs.
 
 use serde::Serialize;
-use upright::table::Law;
+use upright::table::{Law, Limits};
 
-use super::error::VerifyError;
+use super::corners::MOST_LINKS;
+use super::error::{VerifyError, chain, within};
 use super::needed_force::NeededForce;
-use super::trial::{Disturbance, Horizon, disturbed, trial};
+use super::trial::{Disturbance, Horizon, disturbed, leaning, trial, waking_lean};
 use crate::parallel;
 use crate::plant::absolute_angles;
+use crate::reality::{corner_machine, corners_of};
 use crate::rig::Rig;
-use crate::simulate::{SimulationError, run};
-use crate::table::TableValues;
+use crate::simulate::{Scenario, SimulationError, run};
+use crate::table::{MAX_SENSORS, TableValues};
+
+/// Duration of a run at a corner of `[robust]` (s).
+const CORNER_S: f64 = 20.0;
 
 /// Several runs at rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseRun {
-    /// Number of runs, with the seeds from 1.
-    pub seeds: u64,
+    /// Number of runs.
+    pub runs: u64,
     /// How many of them survived to the end, with the motor on.
     pub survived: u64,
     /// Duration of each run (s).
@@ -45,6 +50,45 @@ pub struct MeasuredRipple {
     pub angle_rms_rad: Vec<f64>,
     /// Estimate minus true state, each state.
     pub estimate_error_rms: Vec<f64>,
+    /// Largest shares of the limits at which the motor is turned off.
+    pub limit_share: LimitShare,
+}
+
+/// Largest share of each limit at which the supervisor turns the motor off; 0 without that limit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct LimitShare {
+    /// Of the way from the set-point to the limit of the rail.
+    pub rail: f64,
+    /// Of the angle of any link from the vertical.
+    pub angle: f64,
+    /// Of the cart's speed.
+    pub speed: f64,
+}
+
+impl LimitShare {
+    /// The largest of the three.
+    pub fn largest(self) -> f64 {
+        self.rail.max(self.angle).max(self.speed)
+    }
+
+    fn of(limits: &Limits<MAX_SENSORS>, state: &[f64]) -> Self {
+        let &[position, speed, ..] = state else { return Self::default() };
+        let ends = limits.rail_m.map(|end| position / f64::from(end));
+        let angles = absolute_angles(state).map(f64::abs);
+        Self {
+            rail: ends[0].max(ends[1]),
+            angle: angles.fold(0.0, f64::max) / f64::from(limits.angle_rad),
+            speed: speed.abs() / f64::from(limits.speed_m_per_s),
+        }
+    }
+
+    fn max(self, other: Self) -> Self {
+        Self {
+            rail: self.rail.max(other.rail),
+            angle: self.angle.max(other.angle),
+            speed: self.speed.max(other.speed),
+        }
+    }
 }
 
 fn most(one: Option<f64>, other: Option<f64>) -> Option<f64> {
@@ -60,6 +104,7 @@ struct Sums {
     state: Vec<f64>,
     angle: Vec<f64>,
     error: Vec<f64>,
+    share: LimitShare,
     survives: bool,
 }
 
@@ -75,17 +120,47 @@ pub fn noise_run(
     seeds: u64,
     duration_s: f64,
 ) -> Result<NoiseRun, VerifyError> {
-    let states = rig.states();
-    let links = rig.links();
-    let needed = NeededForce::of(rig);
-    let one = |seed: u64| -> Result<Sums, SimulationError> {
+    let runs: Vec<_> =
+        (1..=seeds).map(|seed| (rig.clone(), disturbed(rig, law, duration_s, disturbance, seed))).collect();
+    noise_of(&runs, table, duration_s)
+}
+
+/// The same with one run of 20 s at each combination of wrong masses within `[robust]`, with all of its other
+/// tolerances: [`corner_machine`].
+///
+/// # Errors
+/// [`VerifyError`] for a model, a chain of more than 9 links, or runs that cannot be started.
+pub fn corner_noise(
+    rig: &Rig,
+    table: &TableValues,
+    law: Law,
+    disturbance: &Disturbance,
+) -> Result<NoiseRun, VerifyError> {
+    let links = chain(rig, "masses")?.links.len();
+    within("links", links as f64, 1.0..=MOST_LINKS as f64, "a chain of at most 9 links")?;
+    let run_of = |number: u64| {
+        let machine = corner_machine(rig, number);
+        let start = leaning(&machine, &vec![waking_lean(&machine); machine.links()]);
+        let scenario = disturbed(&machine, law, CORNER_S, disturbance, number + 1);
+        (machine, Scenario { start, ..scenario })
+    };
+    let runs: Vec<_> = (0..corners_of(rig)).map(run_of).collect();
+    noise_of(&runs, table, CORNER_S)
+}
+
+/// What is measured in runs of machines of one rig.
+fn noise_of(runs: &[(Rig, Scenario)], table: &TableValues, duration_s: f64) -> Result<NoiseRun, VerifyError> {
+    let of_first = runs.first().map(|(rig, _)| (rig.states(), rig.links(), rig.chain().is_some()));
+    let (states, links, is_chain) = of_first.unwrap_or_default();
+    let needed = runs.first().and_then(|(rig, _)| NeededForce::of(rig));
+    let one = |(rig, scenario): &(Rig, Scenario)| -> Result<Sums, SimulationError> {
         let mut sums = Sums {
             state: vec![0.0; states],
             error: vec![0.0; states],
             angle: vec![0.0; links],
             ..Sums::default()
         };
-        let fall = run(rig, table, &disturbed(rig, law, duration_s, disturbance, seed), &mut |sample| {
+        let fall = run(rig, table, scenario, &mut |sample| {
             sums.peak = sums.peak.max(sample.force.abs());
             if let Some(needed) = &needed {
                 let (force_n, share) = needed.at(sample.force, sample.state);
@@ -95,6 +170,9 @@ pub fn noise_run(
                 return;
             }
             sums.ticks += 1.0;
+            if is_chain {
+                sums.share = sums.share.max(LimitShare::of(&table.limits, sample.state));
+            }
             sums.force += sample.force * sample.force;
             for (sum, x) in sums.state.iter_mut().zip(sample.state) {
                 *sum += x * x;
@@ -108,8 +186,8 @@ pub fn noise_run(
         })?;
         Ok(Sums { survives: fall.is_none(), ..sums })
     };
-    let all: Vec<Sums> = parallel::try_map::<_, _, SimulationError>(1..=seeds, one)?;
-    // Sums are taken in the order of the seeds, whichever thread made the runs.
+    let all: Vec<Sums> = parallel::try_map::<_, _, SimulationError>(runs, one)?;
+    // Sums are taken in the order of the runs, whichever thread made the runs.
     let survived: Vec<Sums> = all.into_iter().filter(|sums| sums.survives).collect();
     let ticks: f64 = survived.iter().map(|sums| sums.ticks).sum();
     let rms = |part: &dyn Fn(&Sums) -> f64| (survived.iter().map(part).sum::<f64>() / ticks.max(1.0)).sqrt();
@@ -123,8 +201,9 @@ pub fn noise_run(
         state_rms: (0..states).map(|i| rms(&|sums| sums.state[i])).collect(),
         angle_rms_rad: (0..links).map(|i| rms(&|sums| sums.angle[i])).collect(),
         estimate_error_rms: (0..states).map(|i| rms(&|sums| sums.error[i])).collect(),
+        limit_share: survived.iter().map(|sums| sums.share).fold(LimitShare::default(), LimitShare::max),
     });
-    Ok(NoiseRun { seeds, survived: survived.len() as u64, duration_s, ripple })
+    Ok(NoiseRun { runs: runs.len() as u64, survived: survived.len() as u64, duration_s, ripple })
 }
 
 /// Results of long runs.

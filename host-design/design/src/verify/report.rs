@@ -7,7 +7,7 @@ use super::corners::MOST_LINKS;
 use super::{
     Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Disturbance, Effort,
     EncoderSettings, ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun,
-    PushSurvival, RequiredSurvival, VerifyError, attraction, coarsest_encoder, corners, linear,
+    PushSurvival, RequiredSurvival, VerifyError, attraction, coarsest_encoder, corner_noise, corners, linear,
     mass_tolerances, monte_carlo, noise_run, pushes, required_imperfections, spread,
 };
 use crate::design::Certified;
@@ -37,6 +37,8 @@ pub struct LawTrust {
     pub pushes: Vec<PushSurvival>,
     /// Ripple in simulated runs with noise.
     pub noise_run: Option<NoiseRun>,
+    /// The same at the corners of `[robust]`; none without `[robust]`.
+    pub corner_noise: Option<NoiseRun>,
     /// The coarsest encoder.
     pub coarsest_encoder: Option<CoarsestEncoder>,
     /// Runs with every combination of mass errors.
@@ -122,6 +124,7 @@ impl LawTrust {
             attraction: None,
             pushes: Vec::new(),
             noise_run: None,
+            corner_noise: None,
             coarsest_encoder: None,
             corners: None,
             mass_tolerances: Vec::new(),
@@ -153,6 +156,10 @@ fn law_trust(
     }
     stage("noise");
     trust.noise_run = noise(rig, table, law)?;
+    if rig.robust.is_some() && is_chain && rig.links() <= MOST_LINKS {
+        stage("corners of [robust]");
+        trust.corner_noise = known(corner_noise(rig, table, law, &Disturbance::of(rig)))?;
+    }
     if table.observer.is_some() && is_chain {
         stage("coarsest encoder");
         trust.coarsest_encoder = known(coarsest_encoder(rig, law, &EncoderSettings::of(rig)))?;
@@ -233,6 +240,7 @@ fn checks(rig: &Rig, trust: &LawTrust) -> Vec<Check> {
         let requirement = "peak sensitivity at most (peak_sensitivity)";
         Check { law, requirement, required, found: Some(peak), holds: peak <= required }
     }));
+    checks.extend(limit_check(rig, trust));
     checks.extend(counted_checks(trust));
     checks
 }
@@ -271,6 +279,14 @@ fn run_checks(required: &Requirements, trust: &LawTrust) -> Vec<Check> {
     [tilt, encoder, random].into_iter().flatten().collect()
 }
 
+/// A loop that uses most of a limit at rest reaches it within hours.
+fn limit_check(rig: &Rig, trust: &LawTrust) -> Option<Check> {
+    let ripple = trust.noise_run.as_ref()?.ripple.as_ref().filter(|_| rig.chain().is_some())?;
+    let (required, found) = (rig.verify.limit_percent, 100.0 * ripple.limit_share.largest());
+    let requirement = "share of a limit used at rest in %, at most (limit_percent)";
+    Some(Check { law: trust.linear.law, requirement, required, found: Some(found), holds: found <= required })
+}
+
 /// Requirements that all of a number of runs survive.
 fn counted_checks(trust: &LawTrust) -> Vec<Check> {
     let law = trust.linear.law;
@@ -279,11 +295,15 @@ fn counted_checks(trust: &LawTrust) -> Vec<Check> {
         Check::all_survive(law, "combinations of mass errors that survive (corner_percent)", all, survived)
     });
     let nominal = trust.noise_run.as_ref().map(|noise| {
-        Check::all_survive(law, "nominal runs that survive", noise.seeds as f64, noise.survived as f64)
+        Check::all_survive(law, "nominal runs that survive", noise.runs as f64, noise.survived as f64)
+    });
+    let tolerated = trust.corner_noise.as_ref().map(|noise| {
+        let requirement = "combinations of mass errors within [robust] that survive";
+        Check::all_survive(law, requirement, noise.runs as f64, noise.survived as f64)
     });
     let imperfections = trust.imperfections.iter().map(|required| {
         let (runs, within) = (required.runs as f64, required.verdict.stayed_on as f64);
         Check::all_survive(law, required.requirement, runs, within)
     });
-    corners.into_iter().chain(nominal).chain(imperfections).collect()
+    corners.into_iter().chain(nominal).chain(tolerated).chain(imperfections).collect()
 }

@@ -235,6 +235,18 @@ pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
     start
 }
 
+/// Distance by which a set-point moves (m): 0.1 m, or half of the way to the nearer end of the rail.
+pub(crate) fn moved_setpoint_m(table: &TableValues) -> f64 {
+    let [low, high] = table.limits.rail_m.map(f64::from);
+    (0.5 * high.min(-low)).min(0.1)
+}
+
+/// The run with a set-point that moves there and back.
+pub fn moving(scenario: Scenario, table: &TableValues) -> Scenario {
+    let (step_at_s, step_until_s) = (0.2 * scenario.duration_s, 0.6 * scenario.duration_s);
+    Scenario { step_m: moved_setpoint_m(table), step_at_s, step_until_s, ..scenario }
+}
+
 /// A lean of every link (rad) with which an imperfect machine starts. The links of a stepper whose joints stick would
 /// stand below one count of their encoder, because no force on the cart wakes the loop; so they lean by one.
 pub(crate) fn waking_lean(rig: &Rig) -> f64 {

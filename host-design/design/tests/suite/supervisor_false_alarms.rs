@@ -1,8 +1,9 @@
 //! A healthy rig is never switched off.
 
 use upright_design::parallel;
+use upright_design::reality::{corner_machine, drawn_machine};
 use upright_design::rig::{PerJoint, Rig, Tolerances};
-use upright_design::robust::{Healthy, Machines, balance, corner_machine, false_alarms, healthy_machine};
+use upright_design::robust::{Healthy, Machines, balance, false_alarms};
 use upright_design::study::Study;
 use upright_design::table::TableValues;
 
@@ -80,11 +81,11 @@ fn sixty_times_the_disturbance_is_an_alarm() {
 fn machines_of_a_study_are_within_the_tolerances_and_their_alarms_are_counted() {
     let tolerating = tolerating("single-quanser-ip02", 5.0, 3e-2);
     for number in 0..50 {
-        let reality = healthy_machine(&tolerating, number).reality;
+        let reality = drawn_machine(&tolerating, number).reality;
         assert!(reality.parameters.cart_mass_percent.abs() <= 5.0, "{reality:?}");
         assert!((0.0..=3e-2).contains(&reality.friction.joint_friction_n_m.of(0)), "{reality:?}");
     }
-    assert_ne!(healthy_machine(&tolerating, 1), healthy_machine(&tolerating, 2));
+    assert_ne!(drawn_machine(&tolerating, 1), drawn_machine(&tolerating, 2));
     let count = |rig: &Rig| {
         false_alarms(rig, &table(rig), Law::Lqr, (Machines::Drawn(2), 5.0), &Study::whole(), &|| ()).unwrap()
     };

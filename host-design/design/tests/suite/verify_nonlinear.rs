@@ -12,7 +12,7 @@ use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_design::verify::{
     AttractionSettings, CornerSettings, Disturbance, Effort, EncoderSettings, Horizon, MapAxis, Mass, Spread,
-    attraction, attraction_map, coarser, coarsest_encoder, corners, endurance, largest_percent,
+    attraction, attraction_map, coarser, coarsest_encoder, corner_noise, corners, endurance, largest_percent,
     mass_tolerances, monte_carlo, noise_run, sample, trial,
 };
 
@@ -139,6 +139,26 @@ fn every_corner_of_two_percent_wrong_masses_survives() {
         let found = corners(rig, table, law, 2.0, &settings).unwrap();
         assert_eq!((found.survived, found.corners), (32, 32), "{law:?}: {:?}", found.lost);
     }
+}
+
+#[test]
+fn wrong_masses_and_friction_together_fell_a_loop_that_survives_each_alone() {
+    let robust = rig("quadruple-robust.toml");
+    let survived = |rig: &Rig| {
+        corner_noise(rig, &table(rig), Law::PolePlacement, &PAPERS).map(|found| [found.survived, found.runs])
+    };
+    assert_eq!(survived(&robust).unwrap(), [32, 32]);
+    // Less noise in the observer: enough for masses alone and for friction alone.
+    let mut less = robust;
+    less.kalman.as_mut().unwrap().joint_noise = vec![9e-11; 4];
+    let [survives, all] = survived(&less).unwrap();
+    assert!(survives < all, "{survives} of {all}");
+    let mut alone = less.clone();
+    alone.robust.as_mut().unwrap().joint_friction_n_m = 0.0;
+    assert_eq!(survived(&alone).unwrap(), [32, 32]);
+    let mut alone = less;
+    alone.robust.as_mut().unwrap().mass_percent = 0.0;
+    assert_eq!(survived(&alone).unwrap(), [32, 32]);
 }
 
 #[test]

@@ -124,6 +124,22 @@ fn too_small_a_force_fails_where_it_is_about_tilt_or_runs() {
 }
 
 #[test]
+fn a_cart_that_uses_most_of_its_rail_at_rest_is_refused_and_integral_action_brings_it_back() {
+    // Friction, and zeros off by 3 mrad: the cart rests far from its set-point. With pole placement, three of eight
+    // such machines reach the end of the rail within hours.
+    let reality = "name = \"double-quanser-dbpen\"\nreality.joint_friction_n_m = 5e-4\n\
+                   reality.cart_friction_n = 0.5\nreality.homing_error_rad = 3e-3\n";
+    let refused = |more: &str, law: &str| {
+        let changed_name = ("name = \"double-quanser-dbpen\"", format!("{reality}{more}"));
+        let (_folder, path) = changed("double-quanser-dbpen", &[(changed_name.0, &changed_name.1)]);
+        let output = verify(&path, &["--json", "--runs", "1", "--law", law], None);
+        failed(&object(&output)).iter().any(|line| line.contains("limit_percent"))
+    };
+    assert!(refused("", "lqr") && refused("", "pole-placement"));
+    assert!(!refused("integral.position_weight = 20\n", "lqr"));
+}
+
+#[test]
 fn a_requirement_without_any_value_that_meets_it_is_not_called_unlimited() {
     let weak = ["--runs", "1", "--law", "lqr", "--force-limit", "0.05"];
     let output = verify(&rig_path("quadruple-paper"), &weak, None);

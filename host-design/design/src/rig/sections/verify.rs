@@ -41,6 +41,9 @@ keys! {
         success_percent: f64, "%", Rule::PERCENT,
             "least share of random plants that survive, as the lower end of its 95 % interval",
             Absent::Numbers(&[95.0]);
+        limit_percent: f64, "%", Rule::PERCENT,
+            "largest share of the rail, the angle limit and the speed limit that the loop uses at rest",
+            Absent::Numbers(&[40.0]);
         encoder_factor: f64, "", Rule::POSITIVE,
             "least factor by which all encoders may be coarser", Absent::Numbers(&[1.5]);
         force_rms_n: Option<f64>, "N", Rule::NOT_NEGATIVE,

@@ -10,12 +10,23 @@ use crate::parallel;
 use crate::rig::Rig;
 use crate::simulate::{FallKind, Scenario, SimulationError};
 use crate::table::TableValues;
-use crate::verify::trial::{Horizon, Outcome, disturbed, leaning, trial, waking_lean};
+use crate::verify::trial::{Horizon, Outcome, disturbed, leaning, moving, trial, waking_lean};
 
 /// Sizes are tried from this share of a good machine's to this multiple of a poor one's.
 const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
 /// A change of the rig file is a cure if the motor stays on up to this many times the size.
 const CURES: f64 = 1.2;
+
+/// What has to survive a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Judge {
+    /// The controller alone, at rest.
+    Controller,
+    /// The whole firmware, at rest.
+    Firmware,
+    /// The whole firmware, with a set-point that moves.
+    FirmwareMoving,
+}
 
 pub(super) struct SizeSearch<'a> {
     pub(super) rig: &'a Rig,
@@ -33,12 +44,17 @@ impl SizeSearch<'_> {
     ) -> Result<Survival, SimulationError> {
         let [_, largest_tried] = self.range(imperfection);
         let of_bristles = imperfection.bristles_rad().into_iter().map(|bristle_rad| {
-            let end = |size, is_supervised| {
-                self.end(&[imperfection.on_with(self.rig, size, bristle_rad)], is_supervised)
+            let first = |judge| {
+                self.first(imperfection, &|size| {
+                    self.end(&[imperfection.on_with(self.rig, size, bristle_rad)], judge)
+                })
             };
-            let falls_at = self.first(imperfection, &|size| end(size, false))?;
-            let turned_off_at = self.first(imperfection, &|size| end(size, true))?;
-            Ok((bristle_rad, falls_at, turned_off_at))
+            Ok((
+                bristle_rad,
+                first(Judge::Controller)?,
+                first(Judge::Firmware)?,
+                first(Judge::FirmwareMoving)?,
+            ))
         });
         let of_bristles = of_bristles.collect::<Result<Vec<_>, SimulationError>>()?;
         let least = |sizes: &mut dyn Iterator<Item = Option<(f64, FallKind)>>| {
@@ -46,21 +62,23 @@ impl SizeSearch<'_> {
         };
         let falls_at = least(&mut of_bristles.iter().map(|one| one.1));
         let turned_off_at = least(&mut of_bristles.iter().map(|one| one.2));
-        let first_at = [falls_at, turned_off_at].into_iter().flatten();
+        let off_moving_at = least(&mut of_bristles.iter().map(|one| one.3));
+        let first_at = [falls_at, turned_off_at, off_moving_at].into_iter().flatten();
         let danger_at = first_at.map(|(size, _)| size).fold(largest_tried, f64::min);
         Ok(Survival {
             imperfection,
             falls_at: falls_at.map(|(size, _)| size),
             turned_off_at: turned_off_at.map(|(size, _)| size),
             ended_by: turned_off_at.map(|(_, kind)| kind),
+            off_moving_at: off_moving_at.map(|(size, _)| size),
             cure: turned_off_at.map_or(Ok(None), |(size, _)| self.cure(imperfection, size, changed))?,
             tried: changed.iter().map(|(change, _)| change.clone()).collect(),
             bristles: of_bristles
                 .into_iter()
-                .filter_map(|(bristle_rad, falls_at, turned_off_at)| {
-                    let [falls_at, turned_off_at] =
-                        [falls_at, turned_off_at].map(|at| at.map(|(size, _)| size));
-                    Some(OfBristle { bristle_rad: bristle_rad?, falls_at, turned_off_at })
+                .filter_map(|(bristle_rad, falls, off, moving)| {
+                    let [falls_at, turned_off_at, off_moving_at] =
+                        [falls, off, moving].map(|at| at.map(|(size, _)| size));
+                    Some(OfBristle { bristle_rad: bristle_rad?, falls_at, turned_off_at, off_moving_at })
                 })
                 .collect(),
             largest_tried,
@@ -80,11 +98,12 @@ impl SizeSearch<'_> {
             let search = SizeSearch { table, ..*self };
             // Most changes help little: those are found with one size.
             let needed = best.as_ref().map_or(CURES * size, |best| best.turned_off_at);
-            if search.end(&imperfection.on_each(self.rig, needed), true)?.is_some() {
+            if search.end(&imperfection.on_each(self.rig, needed), Judge::Firmware)?.is_some() {
                 continue;
             }
-            let found =
-                self.first(imperfection, &|size| search.end(&imperfection.on_each(self.rig, size), true))?;
+            let found = self.first(imperfection, &|size| {
+                search.end(&imperfection.on_each(self.rig, size), Judge::Firmware)
+            })?;
             let [_, largest] = self.range(imperfection);
             let turned_off_at = found.map_or(largest, |(size, _)| size);
             best = Some(Cure { change: change.clone(), turned_off_at });
@@ -122,10 +141,10 @@ impl SizeSearch<'_> {
     }
 
     /// How the first of the runs on these machines ends that does not survive.
-    fn end(&self, machines: &[Rig], is_supervised: bool) -> Result<Option<FallKind>, SimulationError> {
+    fn end(&self, machines: &[Rig], judge: Judge) -> Result<Option<FallKind>, SimulationError> {
         for real in machines {
             for seed in 1..=self.settings.seeds {
-                if let Some(fall) = self.run(real, seed, is_supervised)?.fall {
+                if let Some(fall) = self.run(real, seed, judge)?.fall {
                     return Ok(Some(fall.kind));
                 }
             }
@@ -133,13 +152,14 @@ impl SizeSearch<'_> {
         Ok(None)
     }
 
-    fn run(&self, real: &Rig, seed: u64, is_supervised: bool) -> Result<Outcome, SimulationError> {
+    fn run(&self, real: &Rig, seed: u64, judge: Judge) -> Result<Outcome, SimulationError> {
         let ImperfectionSettings { duration_s, disturbance, .. } = self.settings;
         let scenario = Scenario {
-            is_supervised,
+            is_supervised: judge != Judge::Controller,
             start: leaning(real, &vec![waking_lean(real); real.links()]),
             ..disturbed(real, self.law, *duration_s, disturbance, seed)
         };
+        let scenario = if judge == Judge::FirmwareMoving { moving(scenario, self.table) } else { scenario };
         trial(real, self.table, &scenario, &Horizon::default())
     }
 
@@ -156,9 +176,9 @@ impl SizeSearch<'_> {
     /// alone.
     pub(super) fn verdict(&self, real: &Rig) -> Result<SizeRuns, SimulationError> {
         let one = |seed: u64| {
-            let by_firmware = self.run(real, seed, true)?;
+            let by_firmware = self.run(real, seed, Judge::Firmware)?;
             let alone = match by_firmware.fall {
-                Some(_) => self.run(real, seed, false)?,
+                Some(_) => self.run(real, seed, Judge::Controller)?,
                 None => by_firmware.clone(),
             };
             Ok::<_, SimulationError>((by_firmware, alone))

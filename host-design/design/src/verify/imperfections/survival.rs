@@ -56,6 +56,9 @@ pub struct Survival {
     pub turned_off_at: Option<f64>,
     /// What ends the run of the whole firmware at that size.
     pub ended_by: Option<FallKind>,
+    /// The same as `turned_off_at` with a set-point that moves by 0.1 m and back, or by half of the way to the nearer
+    /// end of the rail.
+    pub off_moving_at: Option<f64>,
     /// The best change of the rig file that was tried; none if none of them helps.
     pub cure: Option<Cure>,
     /// Every change that was tried.
@@ -66,7 +69,7 @@ pub struct Survival {
     pub bristles: Vec<OfBristle>,
     /// Largest size tried.
     pub largest_tried: f64,
-    /// Typical size in a poor machine over the smaller of both sizes: above 1 the imperfection is dangerous.
+    /// Typical size in a poor machine over the smallest of these sizes: above 1 the imperfection is dangerous.
     pub danger: f64,
 }
 
@@ -88,15 +91,20 @@ pub struct OfBristle {
     pub falls_at: Option<f64>,
     /// As in [`Survival`].
     pub turned_off_at: Option<f64>,
+    /// As in [`Survival`].
+    pub off_moving_at: Option<f64>,
 }
 
 impl Survival {
     /// What was found beside the sizes: the sizes for each bristle length, and the cure.
     pub fn remarks(&self) -> Vec<String> {
         let of_bristle = |of: &OfBristle| {
-            let [falls, off] = [of.falls_at, of.turned_off_at].map(|size| self.size_text(size));
+            let [falls, off, moving] =
+                [of.falls_at, of.turned_off_at, of.off_moving_at].map(|size| self.size_text(size));
             let bristle = significant(of.bristle_rad, 2);
-            format!("friction that builds up over {bristle} rad: falls at {falls}, motor off {off}")
+            format!(
+                "friction that builds up over {bristle} rad: falls at {falls}, motor off {off}, moving {moving}"
+            )
         };
         let cure = match (&self.cure, self.turned_off_at) {
             (Some(Cure { change, turned_off_at }), _) => {
@@ -118,6 +126,11 @@ impl Survival {
     /// [`Self::turned_off_at`] as text.
     pub fn turned_off_text(&self) -> String {
         self.size_text(self.turned_off_at)
+    }
+
+    /// [`Self::off_moving_at`] as text.
+    pub fn off_moving_text(&self) -> String {
+        self.size_text(self.off_moving_at)
     }
 
     /// What ends the run of the whole firmware at that size, as text; empty if it stays on.

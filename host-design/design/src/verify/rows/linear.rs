@@ -3,7 +3,7 @@
 use super::quantity::Values::{Each, One};
 use super::quantity::{TrustQuantity, force, input, is_chain, number};
 use crate::rig::Rig;
-use crate::verify::{LawTrust, Margins, NoiseShare};
+use crate::verify::{LawTrust, LimitShare, Margins, NoiseShare};
 
 pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
@@ -133,7 +133,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
                   the motor: trust this row more",
         values: One(|rig, law| {
             let run = law.noise_run.as_ref()?;
-            let fallen = run.seeds - run.survived;
+            let fallen = run.runs - run.survived;
             Some(match &run.ripple {
                 None => format!("all {fallen} runs fall"),
                 Some(found) => {
@@ -142,6 +142,26 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
                     format!("{}{others}", ripple(rig, found.force_rms_n, &found.state_rms))
                 }
             })
+        }),
+    },
+    TrustQuantity {
+        name: "of the limits",
+        meaning: "largest share, in those runs, of the limits at which the motor is turned off: a cart that uses most of its \
+                  rail at rest reaches its end within hours",
+        values: One(|rig, law| {
+            let ripple = law.noise_run.as_ref()?.ripple.as_ref().filter(|_| is_chain(rig))?;
+            Some(limits(ripple.limit_share))
+        }),
+    },
+    TrustQuantity {
+        name: "within [robust]",
+        meaning: "runs of 20 s with every combination of the wrong masses of `[robust]`, with all of its friction, wrong \
+                  zeros and latency, and the largest share of the limits in them",
+        values: One(|_, law| {
+            let run = law.corner_noise.as_ref()?;
+            let shares =
+                run.ripple.as_ref().map_or(String::new(), |found| format!("; {}", limits(found.limit_share)));
+            Some(format!("{} of {} combinations survive{shares}", run.survived, run.runs))
         }),
     },
     TrustQuantity {
@@ -175,4 +195,9 @@ fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
 /// A time (s) in milliseconds; `none` if there is no limit.
 fn milliseconds(seconds: Option<f64>, none: &str) -> String {
     seconds.map_or(none.to_owned(), |s| format!("{} ms", number(1e3 * s)))
+}
+
+fn limits(share: LimitShare) -> String {
+    let [rail, angle, speed] = [share.rail, share.angle, share.speed].map(|share| number(1e2 * share));
+    format!("rail {rail} %, angle {angle} %, speed {speed} %")
 }

@@ -62,6 +62,7 @@ fn made(
         attraction: None,
         pushes: Vec::new(),
         noise_run: None,
+        corner_noise: None,
         coarsest_encoder: None,
         corners: None,
         mass_tolerances: Vec::new(),

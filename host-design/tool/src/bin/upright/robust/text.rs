@@ -86,7 +86,9 @@ fn write_judgement(out: &mut String, judgement: &Judgement, input: CartInput) ->
         writeln!(out, "{}", row([&share, &survived, &force, &angle, &cart, &ended_by]).trim_end())?;
     }
     match judgement.corners {
-        Some([all, survived]) => writeln!(out, "  wrong masses: {survived} of {all} combinations survive"),
+        Some([all, survived]) => {
+            writeln!(out, "  share 1 with wrong masses: {survived} of {all} combinations survive")
+        }
         None => Ok(()),
     }
 }

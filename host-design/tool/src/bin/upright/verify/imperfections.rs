@@ -19,7 +19,11 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
         found.law.key(),
         found.settings.seeds
     )?;
-    writeln!(out, "  {:<26}{:<6}{:>12}{:>12}   {:<22}typical", "", "", "falls at", "motor off", "by")?;
+    writeln!(
+        out,
+        "  {:<26}{:<6}{:>12}{:>12}{:>12}   {:<22}typical",
+        "", "", "falls at", "motor off", "moving", "by"
+    )?;
     for survival in &found.alone {
         write_survival(out, survival)?;
     }
@@ -35,8 +39,9 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
 fn write_survival(out: &mut String, survival: &Survival) -> core::fmt::Result {
     let one = survival.imperfection;
     let (falls, off, by) = (survival.falls_text(), survival.turned_off_text(), survival.ended_by_text());
+    let moving = survival.off_moving_text();
     let (key, unit, typical, source) = (one.key, one.unit, one.typical_text(), one.source);
-    writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}   {by:<22}{typical} ({source})")?;
+    writeln!(out, "  {key:<26}{unit:<6}{falls:>12}{off:>12}{moving:>12}   {by:<22}{typical} ({source})")?;
     survival.remarks().iter().try_for_each(|remark| writeln!(out, "      {remark}"))?;
     if survival.danger > 1.0 { writeln!(out, "      do: {}", one.remedy) } else { Ok(()) }
 }
