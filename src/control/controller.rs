@@ -262,7 +262,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// First half of a tick: from raw encoder counts to the motor command.
     ///
     /// The command takes effect at once and is held for one tick. With a delay it takes effect at the start of the next
-    /// tick and is held for that tick; with a lag the force approaches it. Then the law also feeds back the pending force.
+    /// tick and is held for that tick; with a lag the force approaches it. Then the law also feeds back the pending
+    /// force.
     ///
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)

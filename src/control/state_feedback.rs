@@ -77,8 +77,8 @@ pub struct LawState<T = f32> {
     pub setpoint: T,
     /// Integrated position error z (m·s).
     pub integral: T,
-    /// What earlier commands leave at the start of a tick (N): the force of the last tick, which a delay applies now, or
-    /// the force from which a drive with lag approaches its command.
+    /// What earlier commands leave at the start of a tick (N): the force of the last tick, which a delay applies now,
+    /// or the force from which a drive with lag approaches its command.
     pub pending: T,
 }
 

@@ -1,8 +1,6 @@
 //! A force that follows its command with a lag of first order: of a motor driver, or of a winding's inductance.
 
-use super::Design;
 use super::riccati::Cost;
-use super::zero_order_hold::zero_order_hold;
 use crate::numerics::{Matrix, Real};
 use crate::rig::Rig;
 
@@ -40,22 +38,6 @@ pub(super) fn force_last<R: Real>(k: &Matrix<R>) -> Matrix<R> {
     let last = k.cols() - 1;
     let from = |column| if column + 1 >= last { 2 * last - 1 - column } else { column };
     Matrix::from_fn(k.rows(), k.cols(), |row, column| k[(row, from(column))].clone())
-}
-
-impl<R: Real> Design<R> {
-    /// The plant from command to state for continuous time, with the force as its last state if it follows with a lag.
-    pub(crate) fn driven(&self) -> (Matrix<R>, Matrix<R>) {
-        with_lag(&self.a, &self.b, self.lag_s)
-    }
-
-    /// The same for ticks of `period` (s).
-    pub(crate) fn driven_sampled(&self, period: &R) -> (Matrix<R>, Matrix<R>) {
-        if self.lag_s == 0.0 {
-            return (self.ad.clone(), self.bd.clone());
-        }
-        let (a, b) = self.driven();
-        zero_order_hold(&a, &b, period)
-    }
 }
 
 /// The shares of the pending force, [in the mean force of a tick, left for the next tick], see

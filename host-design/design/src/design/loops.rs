@@ -1,13 +1,28 @@
 //! The closed loops of a design and their poles.
 
 use super::error::DesignError;
-use super::lag::force_last;
+use super::lag::{force_last, with_lag};
 use super::synthesis::{Design, Feedback, with_integral};
+use super::zero_order_hold::zero_order_hold;
 use crate::numerics::{Complex, Matrix, Real, eigenvalues};
 use crate::rig::Rig;
 use upright::table::{Law, PerLaw};
 
 impl<R: Real> Design<R> {
+    /// The plant from command to state for continuous time, with the force as its last state if it follows with a lag.
+    pub(crate) fn driven(&self) -> (Matrix<R>, Matrix<R>) {
+        with_lag(&self.a, &self.b, self.lag_s)
+    }
+
+    /// The same for ticks of `period` (s).
+    pub(crate) fn driven_sampled(&self, period: &R) -> (Matrix<R>, Matrix<R>) {
+        if self.lag_s == 0.0 {
+            return (self.ad.clone(), self.bd.clone());
+        }
+        let (a, b) = self.driven();
+        zero_order_hold(&a, &b, period)
+    }
+
     /// Poles of every closed loop.
     ///
     /// # Errors

@@ -41,8 +41,7 @@ const FORCE: &[Key] = &[
         name: "driver_lag_s",
         unit: "s",
         rule: Rule::POSITIVE,
-        meaning: "time constant with which the force follows its command: of the motor driver, or inductance by \
-                  resistance of the winding; not with delay_ticks = 1",
+        meaning: "lag of the force: time constant of the motor driver, or of the winding (inductance by resistance)",
         absent: Absent::Follows("it follows at once"),
     },
 ];
