@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(11),
+    format: upright::table_format!(12),
     // Number of states; equal to `NX` in a sound table.
     states: 10,
     // Number of sensors; equal to `NY` in a sound table.
@@ -40,8 +40,11 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     rig_hash: RIG_HASH,
     // Control period (s).
     tick_s: TICK_S,
-    // Delay between a measurement and the force computed from it: 0 or 1 (ticks).
-    delay_ticks: 0,
+    // Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
+    // later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ.
+    pending_acts: 0.0,
+    // Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
+    pending_stays: 0.0,
     // Largest force on the cart (N).
     force_limit_n: 20.0,
     // Gains of the control laws that are designed, at least one.
@@ -50,7 +53,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         lqr: Some(LawGains {
             // K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
             k: columns([[2.2781084, 2.6554902, -9.160463, -4.1506615, -126.060455, -3.9034085, 393.3646, 1.4876164, -423.12985, -18.388689]]),
-            // Gain on the pending force (1); 0 without delay.
+            // Gain on the pending force (1); 0 without delay or lag.
             k_pending: 0.0,
             // Gain on the integrated position error (N/(m s)); 0 without integral action.
             k_integral: 0.0,
@@ -63,7 +66,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         pole_placement: Some(LawGains {
             // K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
             k: columns([[9.243705, 20.633793, -171.82307, -32.6107, -225.30045, -31.775797, 135.11073, -29.605173, -898.03656, -46.97237]]),
-            // Gain on the pending force (1); 0 without delay.
+            // Gain on the pending force (1); 0 without delay or lag.
             k_pending: 0.0,
             // Gain on the integrated position error (N/(m s)); 0 without integral action.
             k_integral: 0.0,
@@ -170,7 +173,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         },
     },
     // CRC-32 of all values above.
-    crc: 0xcc8b_025a,
+    crc: 0x0e49_a274,
 };
 
 /// This table has no swing-up.

@@ -52,7 +52,7 @@ struct ActiveLaw<'t, const NX: usize, T: Scalar> {
 impl<'t, const NX: usize, T: Scalar> ActiveLaw<'t, NX, T> {
     fn new<const NY: usize>(table: &GainTable<NX, NY, T>, law: Law, gains: &'t LawGains<NX, T>) -> Self {
         let zero = T::default();
-        let has_memory = table.delay_ticks == 1 || gains.k_pending != zero || gains.k_integral != zero;
+        let has_memory = table.pending_acts != zero || gains.k_pending != zero || gains.k_integral != zero;
         let is_plain = !has_memory && table.friction.is_none() && table.steps.is_none();
         Self { law, gains, has_memory, is_plain }
     }
@@ -261,8 +261,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
 
     /// First half of a tick: from raw encoder counts to the motor command.
     ///
-    /// With `delay_ticks = 0` the command takes effect at once and is held for one tick. With 1 it takes effect at the
-    /// start of the next tick and is held for that tick; the law then also feeds back the pending force.
+    /// The command takes effect at once and is held for one tick. With a delay it takes effect at the start of the next
+    /// tick and is held for that tick; with a lag the force approaches it. Then the law also feeds back the pending
+    /// force.
     ///
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   u = sat(N r - K x̂ - k_pending u_pending - k_integral z)
@@ -410,9 +411,10 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
 
     /// Updates the memory of the law at the end of a tick, if it has one; returns the force that acted during the tick
     /// (N).
-    #[inline]
+    // Out of line: a tick of a law without memory does not pay for it.
+    #[cold]
     fn advance(&mut self) -> T {
-        let during_this_tick = self.acting();
+        let during_this_tick = self.respond();
         if self.active.has_memory {
             let (position, tick_s) = (self.output(), self.table.tick_s);
             self.state.advance(self.active.gains.k_integral, position, tick_s, self.requested, self.applied);
@@ -420,10 +422,14 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         during_this_tick
     }
 
-    /// Force on the cart during this tick (N); valid between [`control`](Self::control) and
-    /// [`predict`](Self::predict).
-    fn acting(&self) -> T {
-        if self.active.has_memory && self.table.delay_ticks == 1 { self.state.pending } else { self.applied }
+    /// Ends the tick of the drive; returns the mean force on the cart during it (N).
+    // Called in two places: one copy.
+    #[inline(never)]
+    fn respond(&mut self) -> T {
+        if !self.active.has_memory {
+            return self.applied;
+        }
+        self.state.respond(self.table.pending_acts, self.table.pending_stays, self.applied)
     }
 
     /// The cart's speed (m/s), the state after its position.

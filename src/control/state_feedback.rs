@@ -77,7 +77,8 @@ pub struct LawState<T = f32> {
     pub setpoint: T,
     /// Integrated position error z (m·s).
     pub integral: T,
-    /// Force computed in the last tick (N); with a delay it is being applied now.
+    /// What earlier commands leave at the start of a tick (N): the force of the last tick, which a delay applies now,
+    /// or the force from which a drive with lag approaches its command.
     pub pending: T,
 }
 
@@ -110,7 +111,15 @@ impl<T: Scalar> LawState<T> {
                 self.integral += moved;
             }
         }
-        self.pending = applied;
+    }
+
+    /// Ends a tick with the command `applied` (N); returns the mean force during the tick (N). The shares of the
+    /// pending force in it, and in the next pending force, are those of the table.
+    #[inline]
+    pub fn respond(&mut self, pending_acts: T, pending_stays: T, applied: T) -> T {
+        let behind = self.pending - applied;
+        self.pending = applied + pending_stays * behind;
+        applied + pending_acts * behind
     }
 }
 

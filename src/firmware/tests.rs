@@ -340,7 +340,7 @@ fn a_drive_with_pulses_stays_off_on_a_board_that_gives_none() {
         speed_limit_m_per_s: 0.5,
         ..crate::table::StepMap::ideal(TICK_S)
     };
-    let mut table = GainTable { motor: None, steps: Some(map), delay_ticks: 0, ..TABLE };
+    let mut table = GainTable { motor: None, steps: Some(map), pending_acts: 0.0, ..TABLE };
     table.crc = table.checksum();
     assert_eq!(table.check(), Ok(()));
     assert_eq!(on_board::<false>(&table, TICK_S).0, Some(Fault::Table));

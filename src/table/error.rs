@@ -13,7 +13,7 @@ pub enum TableError {
     RigHash,
     /// The swing-up is for another control period than the gains.
     Tick,
-    /// A delay other than 0 or 1 tick.
+    /// A share of the pending force that is not from 0 to 1.
     Delay,
     /// A value is not finite, or a limit, supply or step is not positive.
     Value,
@@ -31,7 +31,7 @@ impl core::fmt::Display for TableError {
             }
             TableError::RigHash => "the swing-up was designed for another rig than the gains",
             TableError::Tick => "the swing-up was designed for another control period than the gains",
-            TableError::Delay => "the table's delay is neither 0 nor 1 tick",
+            TableError::Delay => "the table's share of the pending force is not from 0 to 1",
             TableError::Value => {
                 "the table holds a value that is not finite, or a limit that is not positive"
             }

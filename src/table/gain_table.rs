@@ -30,8 +30,11 @@ part! {
         pub rig_hash: u64,
         /// Control period (s).
         pub tick_s: T,
-        /// Delay between a measurement and the force computed from it: 0 or 1 (ticks).
-        pub delay_ticks: u32,
+        /// Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
+        /// later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ.
+        pub pending_acts: T,
+        /// Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
+        pub pending_stays: T,
         /// Largest force on the cart (N).
         pub force_limit_n: T,
         /// Gains of the control laws that are designed, at least one.
@@ -87,7 +90,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
         }
-        if self.delay_ticks > 1 {
+        if [self.pending_acts, self.pending_stays].iter().any(|share| !(0.0..=1.0).contains(share)) {
             return Err(TableError::Delay);
         }
         let mut measured = self.observer.iter().flat_map(|observer| &observer.measured);
@@ -101,7 +104,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && self.laws.present().all(|(_, law)| law.is_sound())
             && self.motor.iter().all(MotorMap::is_sound)
             && self.steps.iter().all(StepMap::is_sound)
-            && !(self.steps.is_some() && (self.motor.is_some() || self.delay_ticks == 1))
+            && !(self.steps.is_some() && (self.motor.is_some() || self.pending_acts > 0.0))
             && self.limits.is_sound()
             && self.thresholds.is_sound();
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }

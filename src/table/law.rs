@@ -188,7 +188,7 @@ part! {
     pub struct LawGains<NX to MX; T> {
         /// K, one gain per state (N/m, N s/m, N/rad, N s/rad …).
         pub k: SVector<T, NX>,
-        /// Gain on the pending force (1); 0 without delay.
+        /// Gain on the pending force (1); 0 without delay or lag.
         pub k_pending: T,
         /// Gain on the integrated position error (N/(m s)); 0 without integral action.
         pub k_integral: T,

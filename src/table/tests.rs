@@ -58,7 +58,8 @@ fn full() -> GainTable<4, 2> {
         output: 0,
         rig_hash: 0x0123_4567_89ab_cdef,
         tick_s: 0.01,
-        delay_ticks: 1,
+        pending_acts: 0.75,
+        pending_stays: 0.5,
         force_limit_n: next(),
         laws,
         observer: Some(ObserverGains {

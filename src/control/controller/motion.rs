@@ -10,6 +10,8 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
     /// ```text
     /// e = y - C x̂⁻,   x̂ = x̂⁻ + L_k e,   u = sat(u_k - K_k (x̂ - x_k))
     /// ```
+    ///
+    /// The command to a drive with lag leads, so that its force is `u` at the end of the tick.
     pub fn control_on_reference(
         &mut self,
         raw: &[u32; NY],
@@ -34,24 +36,28 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         for ((k, x), planned) in reference.k.iter().zip(&self.estimate).zip(&reference.x) {
             requested -= k * (x - planned);
         }
+        let stays = self.table.pending_stays;
+        if stays != 0.0 {
+            requested = (requested - stays * self.state.pending) / (1.0 - stays);
+        }
         self.actuate(requested)
     }
 
     /// Second half of such a tick: calls `finish` as [`predict_with`](Self::predict_with) does; then `predict`
-    /// replaces the estimate by the one a tick later, with the given force (N) held.
+    /// replaces the estimate by the one a tick later, with the given mean force (N) held.
     #[inline(always)]
     pub fn predict_on_reference(
         &mut self,
         finish: impl FnOnce(&[i32; NY], &dyn Fn() -> [f32; NY], f32),
         predict: impl FnOnce(&mut [f32; NX], f32),
     ) {
-        let force = self.acting();
+        let force = self.respond();
         let estimate = &mut self.estimate.data.0[0];
         if let Mode::Running(observer) = &self.mode {
             finish(self.encoders.counts(), &|| observer.measured(estimate), force);
         }
         let cart = self.cart_after_lag();
-        predict(&mut self.estimate.data.0[0], self.applied);
+        predict(&mut self.estimate.data.0[0], force);
         if let (Some(cart), Some(position)) = (cart, self.estimate.get_mut(0)) {
             *position = cart;
         }
@@ -78,9 +84,9 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         self.state.setpoint
     }
 
-    /// Hands over to the control law, with the governed set-point at `setpoint_m` (m), no integral and no pending
-    /// force. The next tick has to be one of [`control_with`](Self::control_with).
+    /// Hands over to the control law, with the governed set-point at `setpoint_m` (m) and no integral; the pending
+    /// force is that of the motion. The next tick has to be one of [`control_with`](Self::control_with).
     pub fn hand_over(&mut self, setpoint_m: f32) {
-        self.state = LawState { setpoint: setpoint_m, ..LawState::default() };
+        self.state = LawState { setpoint: setpoint_m, pending: self.state.pending, ..LawState::default() };
     }
 }

@@ -15,7 +15,8 @@ fn table() -> GainTable<2, 1> {
         output: 0,
         rig_hash: 7,
         tick_s: 0.5,
-        delay_ticks: 1,
+        pending_acts: 1.0,
+        pending_stays: 0.0,
         force_limit_n: 5.0,
         laws: PerLaw { lqr: Some(law), pole_placement: None },
         observer: Some(ObserverGains {
@@ -132,7 +133,8 @@ fn a_table_that_does_not_fit_is_refused() {
     assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
     assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
     assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
-    assert_eq!(refused(&|t| t.delay_ticks = 2, true), Some(TableError::Delay));
+    assert_eq!(refused(&|t| t.pending_acts = 2.0, true), Some(TableError::Delay));
+    assert_eq!(refused(&|t| t.pending_stays = -0.5, true), Some(TableError::Delay));
     assert_eq!(refused(&|t| t.force_limit_n = f32::NAN, true), Some(TableError::Value));
     assert_eq!(refused(&|t| t.laws.lqr = None, true), Some(TableError::NoLaw));
     assert_eq!(refused(&|t| t.force_limit_n = 6.0, false), Some(TableError::Crc));
@@ -163,7 +165,7 @@ fn stepping() -> GainTable<2, 1> {
     };
     let mut table = GainTable {
         tick_s,
-        delay_ticks: 0,
+        pending_acts: 0.0,
         force_limit_n: f32::MAX,
         laws: PerLaw { lqr: Some(law), pole_placement: None },
         observer: Some(observer),
@@ -213,6 +215,6 @@ fn pulses_need_a_state_that_is_a_number_and_no_measured_cart() {
     assert_eq!(controller.control(&[20_000]).drive, Drive::Steps(0));
     assert_eq!(controller.control_from_state(&vector![0.1, 0.0]).drive, Drive::OFF);
     // A table with a motor, or with a delay, is none of such a drive.
-    let late = GainTable { delay_ticks: 1, ..table };
+    let late = GainTable { pending_acts: 1.0, ..table };
     assert_eq!(GainTable { crc: late.checksum(), ..late }.check(), Err(TableError::Value));
 }

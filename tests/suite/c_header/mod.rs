@@ -112,8 +112,8 @@ fn the_header_has_the_bits_of_the_firmware_with_every_rig_and_law_however_it_is_
     }
 }
 
-/// Rigs with what none of the published ones has: delay, integral, known friction.
-fn variants() -> [(&'static str, Rig); 3] {
+/// Rigs with what none of the published ones has: delay, lag, integral, known friction.
+fn variants() -> [(&'static str, Rig); 5] {
     let single = rig("single-quanser-ip02");
     let mut delayed = single.clone();
     delayed.tick.delay_ticks = 1;
@@ -125,16 +125,21 @@ fn variants() -> [(&'static str, Rig); 3] {
         cart_speed_m_per_s: 0.01,
         fed_forward_percent: 30.0,
     });
+    let mut late = single.clone();
+    late.actuator.driver_lag_s = Some(0.004);
+    let late_and_integral = Rig { integral: integral.clone(), ..late.clone() };
     let both = Rig { integral: integral.clone(), ..delayed.clone() };
     [
         ("delay", delayed),
         ("delay and integral", both),
+        ("lag", late),
+        ("lag and integral", late_and_integral),
         ("integral and friction", Rig { integral, friction, ..single }),
     ]
 }
 
 #[test]
-fn delay_integral_and_known_friction_have_the_bits_of_the_firmware() {
+fn delay_lag_integral_and_known_friction_have_the_bits_of_the_firmware() {
     if !is_there("gcc") {
         return;
     }

@@ -1,12 +1,28 @@
 //! The closed loops of a design and their poles.
 
 use super::error::DesignError;
+use super::lag::{force_last, with_lag};
 use super::synthesis::{Design, Feedback, with_integral};
+use super::zero_order_hold::zero_order_hold;
 use crate::numerics::{Complex, Matrix, Real, eigenvalues};
 use crate::rig::Rig;
 use upright::table::{Law, PerLaw};
 
 impl<R: Real> Design<R> {
+    /// The plant from command to state for continuous time, with the force as its last state if it follows with a lag.
+    pub(crate) fn driven(&self) -> (Matrix<R>, Matrix<R>) {
+        with_lag(&self.a, &self.b, self.lag_s)
+    }
+
+    /// The same for ticks of `period` (s).
+    pub(crate) fn driven_sampled(&self, period: &R) -> (Matrix<R>, Matrix<R>) {
+        if self.lag_s == 0.0 {
+            return (self.ad.clone(), self.bd.clone());
+        }
+        let (a, b) = self.driven();
+        zero_order_hold(&a, &b, period)
+    }
+
     /// Poles of every closed loop.
     ///
     /// # Errors
@@ -29,25 +45,17 @@ impl<R: Real> Design<R> {
     }
 
     /// The closed loop of the continuous plant with `law`, `ζ̇ = M ζ` for set-point 0. ζ holds x, then z with integral
-    /// action.
+    /// action, then the force if it follows with a lag.
     fn continuous_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
-        let (a, b) = if law.integral {
-            with_integral(&self.a, &self.b, rig.output(), &R::one(), &R::zero())
-        } else {
-            (self.a.clone(), self.b.clone())
-        };
+        let (a, b) = self.over_law(rig, law, self.driven(), [&R::one(), &R::zero()]);
         &a - &(&b * &law.k)
     }
 
     /// The closed loop of the sampled plant with `law`, `ζ⁺ = M ζ` for set-point 0. ζ holds x, then z if there is
-    /// integral action, then the pending force if there is a delay; `u = -K ζ`.
+    /// integral action, then the pending force if there is a delay or a lag; `u = -K ζ`.
     pub fn sampled_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
         let period = R::from_f64(rig.tick.period_s);
-        let (a, b) = if law.integral {
-            with_integral(&self.ad, &self.bd, rig.output(), &period, &R::one())
-        } else {
-            (self.ad.clone(), self.bd.clone())
-        };
+        let (a, b) = self.over_law(rig, law, self.driven_sampled(&period), [&period, &R::one()]);
         if law.k.cols() == a.cols() {
             return &a - &(&b * &law.k);
         }
@@ -55,20 +63,39 @@ impl<R: Real> Design<R> {
         a.beside(&b).above(&-&law.k)
     }
 
+    /// The plant from command to state with the states of the law's K: [x; z; f].
+    fn over_law(
+        &self,
+        rig: &Rig,
+        law: &Feedback<R>,
+        (a, b): (Matrix<R>, Matrix<R>),
+        [gain, kept]: [&R; 2],
+    ) -> (Matrix<R>, Matrix<R>) {
+        if !law.integral {
+            return (a, b);
+        }
+        let (a, b) = with_integral(&a, &b, rig.output(), gain, kept);
+        if self.lag_s == 0.0 {
+            return (a, b);
+        }
+        (force_last(&force_last(&a).transpose()).transpose(), force_last(&b.transpose()).transpose())
+    }
+
     /// Input vector of the set-point r in [`sampled_loop`](Self::sampled_loop), `ζ⁺ = M ζ + E r`; none for a law
     /// without N.
     pub fn setpoint_input(&self, rig: &Rig, law: &Feedback<R>) -> Option<Matrix<R>> {
         let n = law.n.as_ref()?;
-        let states = self.ad.rows();
+        let (states, period) = (self.ad.rows(), R::from_f64(rig.tick.period_s));
         let mut input = Matrix::zeros(law.k.cols(), 1);
         if rig.tick.delay_ticks == 1 {
             input[(law.k.cols() - 1, 0)] = n.clone();
         } else {
-            input = input.with_block(0, 0, &self.bd.scaled(n));
+            let (_, b) = self.over_law(rig, law, self.driven_sampled(&period), [&period, &R::one()]);
+            input = b.scaled(n);
         }
         if law.integral {
             // z⁺ = z + T (x - r)
-            input[(states, 0)] = -R::from_f64(rig.tick.period_s);
+            input[(states, 0)] = -period;
         }
         Some(input)
     }

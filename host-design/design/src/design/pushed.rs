@@ -2,6 +2,7 @@
 
 use upright::supervision::finding::IN_A_ROW;
 
+use super::lag::shares;
 use super::zero_order_hold::zero_order_hold;
 use super::{Design, Feedback, Kalman, continuous_plant};
 use crate::numerics::Matrix;
@@ -212,7 +213,7 @@ impl Limits {
 impl PushedLoop<'_> {
     /// Whether no limit is exceeded when the rig is pushed from rest with this force for `lasts` ticks.
     fn survives(&self, law: &Feedback<f64>, push: &UnitPush, lasts: usize, force_n: f64) -> bool {
-        let is_late = self.rig.tick.delay_ticks == 1;
+        let [acts, stays] = shares(self.rig);
         let mut state = vec![0.0; push.held.len()];
         let (mut estimate, mut next) = (state.clone(), state.clone());
         let mut pending = 0.0;
@@ -223,10 +224,11 @@ impl PushedLoop<'_> {
                 let after = since_end.map_or(0.0, |since| push.response[since][i]);
                 estimate[i] = state[i] - force_n * (push.response[tick][i] - after);
             }
-            let of_pending = if is_late { law.k.row(0)[estimate.len()] * pending } else { 0.0 };
+            let of_pending = if acts > 0.0 { law.k.row(0)[estimate.len()] * pending } else { 0.0 };
             let requested = law.force_n(0.0, &estimate) - of_pending;
             let applied = requested.clamp(-self.limit, self.limit);
-            let acting = if is_late { core::mem::replace(&mut pending, applied) } else { applied };
+            let acting = acts * pending + (1.0 - acts) * applied;
+            pending = stays * pending + (1.0 - stays) * applied;
             let force_n = if since_end.is_none() { force_n } else { 0.0 };
             self.design.ad.times_column(&state, &mut next);
             for i in 0..state.len() {

@@ -4,6 +4,7 @@ use super::diagnosis::{why_no_lqr, why_no_placement};
 use super::error::{DesignError, Task};
 use super::hold::Hold;
 use super::kalman::{Kalman, kalman};
+use super::lag::{force_last, lag_s, widened, with_lag};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
 
@@ -26,9 +27,11 @@ pub struct Design<T> {
     pub ad: Matrix<T>,
     /// Bd, s×1; of the mean speed during the tick if the drive imposes the cart's acceleration.
     pub bd: Matrix<T>,
-    /// Gains for continuous time.
+    /// Time constant with which the force follows its command (s); 0 at once.
+    pub lag_s: f64,
+    /// Gains for continuous time. With a lag K has one more entry, for the force.
     pub continuous: Laws<T>,
-    /// Gains for the tick. With one tick of delay K has one more entry, for the pending force.
+    /// Gains for the tick. With one tick of delay, or a lag, K has one more entry, for the pending force.
     pub sampled: Laws<T>,
     /// The observer, if the rig file asks for one.
     pub kalman: Option<Kalman<T>>,
@@ -48,7 +51,7 @@ pub struct Laws<T> {
 /// State feedback with precompensation, `u = N r - K x` for the set-point r.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feedback<T> {
-    /// K, 1×s; one more entry each for integral action and for a delay.
+    /// K, 1×s; one more entry each for integral action and for a delay or lag.
     pub k: Matrix<T>,
     /// N; none if no constant force can hold the output away from 0.
     pub n: Option<T>,
@@ -60,6 +63,11 @@ impl<R: Real> Feedback<R> {
     /// The same with N times `share`. Integral action still brings the output to the set-point, with less overshoot.
     fn with_share_of_n(self, share: &R) -> Self {
         Self { n: self.n.map(|n| n * share), ..self }
+    }
+
+    /// The same with K over [x; z; f] instead of [x; f; z], if there is a force f (`further` 1).
+    fn with_force_last(self, further: usize) -> Self {
+        if further == 0 { self } else { Self { k: force_last(&self.k), ..self } }
     }
 }
 
@@ -110,33 +118,38 @@ impl<R: Real> Design<R> {
         let period = R::from_f64(rig.tick.period_s);
         let hold = Hold::of(rig);
         let (ad, bd) = hold.sampled(&a, &b, &period);
+        let lag_s = lag_s(rig);
+        let further = usize::from(lag_s > 0.0);
+        let plant = with_lag(&a, &b, lag_s);
+        let (a_u, b_u) = hold.sampled(&plant.0, &plant.1, &period);
         let output = rig.output();
         let late = rig.tick.delay_ticks == 1;
 
         let mut sampled = Laws::none();
         if let Some(weights) = &rig.lqr {
-            let cost = match lqr_cost(weights) {
+            let cost = match widened(lqr_cost(weights), further) {
                 of_a_tick if weights.cost_is_sum => of_a_tick,
-                over_time => hold.cost(&a, &b, &over_time, &period),
+                over_time => hold.cost(&plant.0, &plant.1, &over_time, &period),
             };
-            let k = lqr(Task::SampledLqr, &ad, &bd, &cost, residuals)?;
-            sampled.lqr = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));
+            let k = lqr(Task::SampledLqr, &a_u, &b_u, &cost, residuals)?;
+            sampled.lqr = Some(sampled_feedback(k, [&a_u, &b_u], [&a_u, &b_u], output, late));
             if let Some(integral) = &rig.integral {
-                let (a_z, b_z) = with_integral(&ad, &bd, output, &period, &R::one());
+                let (a_z, b_z) = with_integral(&a_u, &b_u, output, &period, &R::one());
                 // z is constant during a tick: its cost over the tick is T w z².
                 let duration = if weights.cost_is_sum { &R::one() } else { &period };
                 let weight = R::from_f64(integral.position_weight) * duration;
                 let cost = with_integral_weight(&cost, &weight);
                 let k = lqr(Task::SampledIntegral, &a_z, &b_z, &cost, residuals)?;
-                let feedback = sampled_feedback(k, [&ad, &bd], [&a_z, &b_z], output, late);
+                let feedback = sampled_feedback(k, [&a_u, &b_u], [&a_z, &b_z], output, late);
+                let feedback = feedback.with_force_last(further);
                 sampled.integral = Some(feedback.with_share_of_n(&R::from_f64(integral.setpoint_weight)));
             }
         }
         if let Some(placement) = &rig.pole_placement {
-            let poles = wanted_poles(placement, rig)?;
+            let poles = all_poles(placement, rig)?;
             let poles: Vec<Pole<R>> = poles.iter().map(|pole| pole.sampled(&period)).collect();
-            let k = placed(Task::SampledPlacement, &ad, &bd, &poles)?;
-            sampled.pole_placement = Some(sampled_feedback(k, [&ad, &bd], [&ad, &bd], output, late));
+            let k = placed(Task::SampledPlacement, &a_u, &b_u, &poles)?;
+            sampled.pole_placement = Some(sampled_feedback(k, [&a_u, &b_u], [&a_u, &b_u], output, late));
         }
         let kalman = rig.kalman.as_ref().map(|noise| {
             let inputs = noise_inputs(rig, &b, &torque_inputs);
@@ -144,16 +157,19 @@ impl<R: Real> Design<R> {
             residuals.push((OBSERVER.to_owned(), residual.to_f64()));
             Ok(gains)
         });
-        Ok(Self { continuous: Laws::none(), sampled, kalman: kalman.transpose()?, a, b, ad, bd })
+        Ok(Self { continuous: Laws::none(), sampled, kalman: kalman.transpose()?, a, b, ad, bd, lag_s })
     }
 }
 
 /// The gains for continuous time.
 fn continuous_laws<R: Real>(rig: &Rig, plant: &LinearModel<R>) -> Result<Laws<R>, DesignError> {
-    let (a, b, output) = (&plant.a, &plant.b, rig.output());
+    let lag_s = lag_s(rig);
+    let further = usize::from(lag_s > 0.0);
+    let (a, b) = &with_lag(&plant.a, &plant.b, lag_s);
+    let output = rig.output();
     let mut laws = Laws::none();
     if let Some(weights) = &rig.lqr {
-        let cost = lqr_cost(weights);
+        let cost = widened(lqr_cost(weights), further);
         let k = lqr(Task::ContinuousLqr, a, b, &cost, &mut Vec::new())?;
         laws.lqr = Some(feedback(k, a, b, output));
         if let Some(integral) = &rig.integral {
@@ -161,11 +177,11 @@ fn continuous_laws<R: Real>(rig: &Rig, plant: &LinearModel<R>) -> Result<Laws<R>
             let cost = with_integral_weight(&cost, &R::from_f64(integral.position_weight));
             let k = lqr(Task::ContinuousIntegral, &a_z, &b_z, &cost, &mut Vec::new())?;
             let share = R::from_f64(integral.setpoint_weight);
-            laws.integral = Some(feedback(k, a, b, output).with_share_of_n(&share));
+            laws.integral = Some(feedback(k, a, b, output).with_force_last(further).with_share_of_n(&share));
         }
     }
     if let Some(placement) = &rig.pole_placement {
-        let k = placed(Task::ContinuousPlacement, a, b, &wanted_poles(placement, rig)?)?;
+        let k = placed(Task::ContinuousPlacement, a, b, &all_poles(placement, rig)?)?;
         laws.pole_placement = Some(feedback(k, a, b, output));
     }
     Ok(laws)
@@ -193,6 +209,7 @@ impl Design<Wide> {
             b: self.b.rounded(round),
             ad: self.ad.rounded(round),
             bd: self.bd.rounded(round),
+            lag_s: self.lag_s,
             continuous: laws(&self.continuous),
             sampled: laws(&self.sampled),
             kalman: self.kalman.as_ref().map(|kalman| Kalman {
@@ -340,6 +357,15 @@ fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
         r: Matrix::from_diagonal(&[R::from_f64(weights.force_weight)]),
         s: Matrix::from_fn(s.len(), 1, |i, _| R::from_f64(s[i])),
     }
+}
+
+/// The continuous-time poles of the loop (1/s): those that the rig file asks for, and a force with a lag keeps its own.
+fn all_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R>>, DesignError> {
+    let mut poles = wanted_poles(placement, rig)?;
+    if let Some(lag_s) = rig.actuator.driver_lag_s {
+        poles.push(Pole::Real(R::zero() - &(R::one() / &R::from_f64(lag_s))));
+    }
+    Ok(poles)
 }
 
 /// The continuous-time poles that the rig file asks for (1/s).

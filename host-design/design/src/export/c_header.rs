@@ -91,7 +91,7 @@ fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Re
     define("STATES", table.states().to_string())?;
     define("SENSORS", table.sensors().to_string())?;
     define("OUTPUT", table.output.to_string())?;
-    define("DELAY_TICKS", table.delay_ticks.to_string())?;
+    define("HAS_PENDING", u8::from(table.pending_acts != 0.0).to_string())?;
     define("LAWS", laws.len().to_string())?;
     for (index, law) in laws.into_iter().enumerate() {
         define(&law.key().to_uppercase(), index.to_string())?;
@@ -150,6 +150,10 @@ fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
     }
     out.line("    },");
     out.float("force_limit_n", table.force_limit_n);
+    if table.pending_acts != 0.0 {
+        out.float("pending_acts", table.pending_acts);
+        out.float("pending_stays", table.pending_stays);
+    }
     let column = |values: &[f32]| values[..states].to_vec();
     out.columns("ad", observer.ad.data.0[..states].iter().map(|values| column(values)));
     out.floats("bd", column(&observer.bd.data.0[0]));

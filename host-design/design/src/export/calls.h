@@ -161,7 +161,14 @@ UPRIGHT_CALL void upright_predict(upright_controller *c)
     if (c->state != UPRIGHT_BALANCING) {
         return;
     }
-    float acting = UPRIGHT_DELAY_TICKS == 1 ? c->pending_n : c->applied_n;
+#if UPRIGHT_HAS_PENDING
+    float behind = c->pending_n - c->applied_n;
+    float acting = c->applied_n + upright_table.pending_acts * behind;
+    c->pending_n = c->applied_n + upright_table.pending_stays * behind;
+#else
+    float acting = c->applied_n;
+    c->pending_n = c->applied_n;
+#endif
     if (upright_has_memory(gains)) {
         if (gains->k_integral != 0.0f) {
             float moved = UPRIGHT_TICK_S * (c->estimate[UPRIGHT_OUTPUT] - c->setpoint_m);
@@ -171,7 +178,6 @@ UPRIGHT_CALL void upright_predict(upright_controller *c)
                 c->integral += moved;
             }
         }
-        c->pending_n = c->applied_n;
     }
 #if UPRIGHT_HAS_PUSHES
     c->lacks_force = upright_lacks_force(c);

@@ -58,6 +58,10 @@ typedef struct {
 typedef struct {
     upright_law_gains laws[UPRIGHT_LAWS];
     float force_limit_n;
+#if UPRIGHT_HAS_PENDING
+    /* Shares of the pending force: in the mean force of a tick, and still pending after it. */
+    float pending_acts, pending_stays;
+#endif
     /* Observer: x+ = Ad x + Bd u; x = x- + L e; travel per count (m or rad). */
     float ad[UPRIGHT_STATES][UPRIGHT_STATES];
     float bd[UPRIGHT_STATES];

@@ -91,7 +91,7 @@ static inline const upright_law_gains *upright_gains(const upright_controller *c
 /* Whether the force depends on earlier ticks by more than the estimate. */
 static inline bool upright_has_memory(const upright_law_gains *gains)
 {
-    return UPRIGHT_DELAY_TICKS == 1 || gains->k_pending != 0.0f || gains->k_integral != 0.0f;
+    return UPRIGHT_HAS_PENDING || gains->k_pending != 0.0f || gains->k_integral != 0.0f;
 }
 
 static inline void upright_count(uint32_t *ticks, bool holds)

@@ -27,12 +27,11 @@ impl Driver {
     pub fn of(rig: &Rig) -> Option<Self> {
         let &DriverFaults { driver_lag_s, current_limit_a, supply_resistance_ohm, force_percent, .. } =
             &rig.reality.driver;
-        let ideal = driver_lag_s == 0.0
-            && current_limit_a.is_none()
-            && supply_resistance_ohm == 0.0
-            && force_percent == 0.0;
+        let lag_s = driver_lag_s.or(rig.actuator.driver_lag_s).unwrap_or(0.0);
+        let ideal =
+            lag_s == 0.0 && current_limit_a.is_none() && supply_resistance_ohm == 0.0 && force_percent == 0.0;
         (!ideal).then(|| Self {
-            lag_s: driver_lag_s,
+            lag_s,
             force_factor: 1.0 + force_percent / 100.0,
             current_limit_a: current_limit_a.unwrap_or(f64::INFINITY),
             supply_resistance_ohm,

@@ -1,7 +1,7 @@
 //! The linear model of a candidate, in f64: ripple, and stability at every combination of mass errors.
 
 use crate::design::{
-    Design, DesignError, Hold, Kalman, continuous_plant, integrated_quadratic, noise_columns,
+    Design, DesignError, Hold, Kalman, continuous_plant, integrated_quadratic, lag_s, noise_columns, with_lag,
 };
 use crate::numerics::Matrix;
 use crate::reality::first_mass;
@@ -48,7 +48,7 @@ impl<'a> LinearPlants<'a> {
         Ok(Self {
             rig,
             tolerances,
-            nominal: held(rig, &design.ad, &design.bd),
+            nominal: held(rig, &design.driven_sampled(&period_s)),
             process: integrated_quadratic(&design.a.transpose(), &spread, &period_s),
             sensor_variances: rig.sensors().iter().map(square).collect(),
         })
@@ -95,10 +95,10 @@ impl<'a> LinearPlants<'a> {
             let factors: Vec<f64> = std::iter::repeat_n(0.0, first).chain(signs).collect();
             let plant = continuous_plant::<f64>(&wrong_masses(rig, tolerances.mass_percent, &factors))?;
             if rig.actuator.input().is_force() {
-                return Ok(PlantModel::delayed(&plant.a, &plant.b, period_s, delay_ticks, &measured(rig)));
+                let (a, b) = with_lag(&plant.a, &plant.b, lag_s(rig));
+                return Ok(PlantModel::delayed(&a, &b, period_s, delay_ticks, &measured(rig)));
             }
-            let (ad, bd) = Hold::of(rig).sampled(&plant.a, &plant.b, &period_s);
-            Ok(held(rig, &ad, &bd))
+            Ok(held(rig, &Hold::of(rig).sampled(&plant.a, &plant.b, &period_s)))
         };
         (0..corners).map(corner).collect()
     }
@@ -128,7 +128,7 @@ fn measured(rig: &Rig) -> Vec<usize> {
 
 /// The plant sampled at its tick. The cart of a drive with pulses is where the observer takes it to be: it decays
 /// within a tick, so that it does not look like two poles at 1.
-fn held(rig: &Rig, ad: &Matrix<f64>, bd: &Matrix<f64>) -> PlantModel<f64> {
+fn held(rig: &Rig, (ad, bd): &(Matrix<f64>, Matrix<f64>)) -> PlantModel<f64> {
     let seen_from = if rig.actuator.input().is_force() { 0 } else { 2 };
     let seen = |matrix: &Matrix<f64>| {
         let entry = |row, column| if row < seen_from { 0.0 } else { matrix[(row, column)] };

@@ -12,7 +12,9 @@ use super::any_size::{MAX_SENSORS, MAX_STATES, WidestTable, WithSize, widest, wi
 use super::error::{NoTable, finite};
 use super::swing_up::SwingUpValues;
 use super::{contents, friction, supervision};
-use crate::design::{Certified, Design, Feedback, Kalman, Uncertified, detection_thresholds, setpoint_step};
+use crate::design::{
+    Certified, Design, Feedback, Kalman, Uncertified, detection_thresholds, setpoint_step, shares,
+};
 use crate::rig::{AccelerationDrive, Motor, PlantDescription, Rig};
 
 /// Which gains go into a table.
@@ -93,6 +95,7 @@ impl TableValues {
         let steps = double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, double);
         let friction = friction::friction_map(rig, double)?;
+        let [pending_acts, pending_stays] = shares(rig);
         let widest = GainTable {
             format: TABLE_FORMAT,
             states: states as u32,
@@ -100,7 +103,8 @@ impl TableValues {
             output: rig.output() as u32,
             rig_hash: rig.hash(),
             tick_s: finite("tick.period_s", rig.tick.period_s as f32)?,
-            delay_ticks: u32::from(rig.tick.delay_ticks),
+            pending_acts: pending_acts as f32,
+            pending_stays: pending_stays as f32,
             force_limit_n: rig
                 .force_limit_n()
                 .map_or(Ok(f32::MAX), |limit| finite("actuator.force_limit_n", limit as f32))?,

@@ -41,7 +41,7 @@ pub(super) fn covariance(
         let p = stationary(&model.matrix, q)?;
         let c = &model.force_output;
         let force = (&(c * &p) * &c.transpose())[(0, 0)] + direct;
-        let states = (0..model.states).map(|state| p[(entry(state), entry(state))].max(0.0).sqrt()).collect();
+        let states = (0..rig.states()).map(|state| p[(entry(state), entry(state))].max(0.0).sqrt()).collect();
         shares.push(NoiseShare { source, force_n: force.max(0.0).sqrt(), states });
         Ok(())
     };
@@ -70,7 +70,7 @@ pub(super) fn covariance(
     let total = NoiseShare {
         source: "total".to_owned(),
         force_n: total(&|share| share.force_n),
-        states: (0..model.states).map(|i| total(&|share| share.states[i])).collect(),
+        states: (0..rig.states()).map(|i| total(&|share| share.states[i])).collect(),
     };
     shares.push(total);
     Ok(Some(shares))

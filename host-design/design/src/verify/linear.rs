@@ -8,8 +8,8 @@ use crate::numerics::{Complex, eigenvalues};
 use crate::rig::Rig;
 use crate::table::TableValues;
 
-use super::{Certificate, LoopModel, Margins, NoiseShare, Rounding, TickLimits, VerifyError};
-use super::{certificate, covariance, loop_model, margins, rounding, tick};
+use super::{Certificate, LagLimits, LoopModel, Margins, NoiseShare, Rounding, TickLimits, VerifyError};
+use super::{certificate, covariance, lag, loop_model, margins, rounding, tick};
 
 /// Results from the linear model of the loop for one law: sampled, delayed, with observer, with the table's
 /// `f32` values.
@@ -36,6 +36,9 @@ pub struct LinearReport {
     /// How slow a drive may be that imposes the cart's acceleration, with the LQR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveLimits>,
+    /// How far the lag of the force may be from the stated one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag: Option<LagLimits>,
 }
 
 /// The linear half of the trust report, one for each law in the table.
@@ -56,11 +59,12 @@ pub fn linear(
         let (poles, spectral_radius) = poles(&model)?;
         let stable = spectral_radius < 1.0;
         let tick_s = rig.tick.period_s;
-        let (mut margins, mut tick, mut noise) = (None, None, None);
+        let (mut margins, mut tick, mut noise, mut real_lag) = (None, None, None, None);
         if stable {
             let grid = margins::Grid::of(&model)?;
             margins = Some(margins::margins(seen, &numbers, &grid, tick_s)?);
             tick = Some(tick::limits(seen, &numbers, &grid, tick_s)?);
+            real_lag = lag::limits(seen, &numbers, tick_s)?;
             noise = covariance::covariance(rig, seen, &model, table.observer.is_some())?;
         }
         let as_designed = loop_model::exact_law(certified, table, law)
@@ -74,6 +78,7 @@ pub fn linear(
             tick,
             noise,
             rounding: rounding::rounding(rig, certified, table, law, spectral_radius)?,
+            lag: real_lag,
             drive: (law == Law::Lqr).then(|| DriveLimits::of(rig, &certified.double)).flatten(),
             certificates: if as_designed { certificates.of_law(law) } else { Vec::new() },
         });

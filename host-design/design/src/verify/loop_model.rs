@@ -8,12 +8,12 @@ use std::borrow::Cow;
 use upright::table::Law;
 
 use super::VerifyError;
-use crate::design::{Certified, Design, Feedback, Kalman, zero_order_hold};
+use crate::design::{Certified, Design, Feedback, Kalman, shares, zero_order_hold};
 use crate::numerics::{Matrix, Real, spectral_radius};
 use crate::rig::Rig;
 use crate::table::{MAX_STATES, TableValues};
 
-/// The plant from force to measurement, `x⁺ = A x + B u`, `y = C x`, with pending forces as further states.
+/// The plant from command to measurement, `x⁺ = A x + B u`, `y = C x`, with pending forces as further states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantModel<R> {
     a: Matrix<R>,
@@ -60,7 +60,8 @@ pub(crate) struct Numbers<R> {
     pub(crate) measured: Vec<usize>,
     pub(super) output: usize,
     pub(super) tick_s: R,
-    pub(super) delay_ticks: usize,
+    /// Shares of the pending force: in the mean force of a tick, and left for the next one.
+    pub(super) pending: [R; 2],
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -94,7 +95,7 @@ impl<R: Real> Numbers<R> {
             measured: measured(table),
             output: table.output as usize,
             tick_s: exact(table.tick_s),
-            delay_ticks: table.delay_ticks as usize,
+            pending: [exact(table.pending_acts), exact(table.pending_stays)],
         })
     }
 
@@ -141,8 +142,13 @@ impl<R: Real> Numbers<R> {
             measured,
             output: rig.output(),
             tick_s: R::from_f64(rig.tick.period_s),
-            delay_ticks: usize::from(rig.tick.delay_ticks),
+            pending: shares(rig).map(R::from_f64),
         })
+    }
+
+    /// Whole ticks by which the force is late.
+    pub(super) fn delay_ticks(&self) -> usize {
+        usize::from(self.pending[0] == R::one())
     }
 }
 
@@ -217,14 +223,17 @@ impl<R: Real> ControllerModel<R> {
     ///
     /// ```text
     /// x̂ = x̂⁻ + L (y - C x̂⁻),   u = -K x̂ - k_pending u_pending - k_integral z,
-    /// x̂⁻⁺ = Ad x̂ + Bd (u or u_pending),   z⁺ = z + T x̂_output,   u_pending⁺ = u
+    /// x̂⁻⁺ = Ad x̂ + Bd (α u_pending + (1-α) u),   z⁺ = z + T x̂_output,   u_pending⁺ = β u_pending + (1-β) u
     /// ```
+    ///
+    /// α and β are `pending_acts` and `pending_stays` of the table.
     pub(crate) fn of(numbers: &Numbers<R>) -> Self {
         let (s, p) = (numbers.k.cols(), numbers.measured.len());
-        let late = numbers.delay_ticks == 1;
+        let [acts, stays] = &numbers.pending;
         let observed = if numbers.observer.is_some() { s } else { 0 };
         let z = (!numbers.k_integral.is_zero()).then_some(observed);
-        let pending = (late || !numbers.k_pending.is_zero()).then_some(observed + usize::from(z.is_some()));
+        let pending =
+            (!acts.is_zero() || !numbers.k_pending.is_zero()).then_some(observed + usize::from(z.is_some()));
         let size = observed + usize::from(z.is_some()) + usize::from(pending.is_some());
 
         // x̂ = from_memory ξ + from_sensors y
@@ -243,15 +252,15 @@ impl<R: Real> ControllerModel<R> {
                 c[(0, index)] = c[(0, index)].clone() - gain;
             }
         }
+        // A share of the pending force, and the rest of the command.
+        let mixed = |share: &R, pending: Option<usize>| {
+            let pick = |_, j| if Some(j) == pending { share.clone() } else { R::zero() };
+            let rest = R::one() - share;
+            (&Matrix::from_fn(1, size, pick) + &c.scaled(&rest), d.scaled(&rest))
+        };
         let (mut a, mut b) = (Matrix::zeros(size, size), Matrix::zeros(size, p));
         if let Some(observer) = &numbers.observer {
-            let now = match pending.filter(|_| late) {
-                Some(pending) => {
-                    let pick = |_, j| if j == pending { R::one() } else { R::zero() };
-                    (Matrix::from_fn(1, size, pick), Matrix::zeros(1, p))
-                }
-                None => (c.clone(), d.clone()),
-            };
+            let now = mixed(acts, pending);
             a = a.with_block(0, 0, &(&(&observer.ad * &from_memory) + &(&observer.bd * &now.0)));
             b = b.with_block(0, 0, &(&(&observer.ad * &from_sensors) + &(&observer.bd * &now.1)));
         }
@@ -262,8 +271,9 @@ impl<R: Real> ControllerModel<R> {
             b = b.with_block(z, 0, &moved(&from_sensors));
         }
         if let Some(pending) = pending {
-            a = a.with_block(pending, 0, &c);
-            b = b.with_block(pending, 0, &d);
+            let left = mixed(stays, Some(pending));
+            a = a.with_block(pending, 0, &left.0);
+            b = b.with_block(pending, 0, &left.1);
         }
         Self { a, b, c, d }
     }
@@ -294,8 +304,8 @@ impl<R: Real> LoopModel<R> {
 
     pub(super) fn with_numbers(certified: &Certified, numbers: &Numbers<R>) -> Self {
         let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
-        let (ad, bd) = (exact(&certified.double.ad), exact(&certified.double.bd));
-        let plant = PlantModel::held(&ad, &bd, numbers.delay_ticks, &numbers.measured);
+        let (ad, bd) = certified.double.driven_sampled(&numbers.tick_s.to_f64());
+        let plant = PlantModel::held(&exact(&ad), &exact(&bd), numbers.delay_ticks(), &numbers.measured);
         Self::of(&plant, &ControllerModel::of(numbers))
     }
 }

@@ -248,9 +248,9 @@ pub(super) fn delayed_loop(
     tick_s: f64,
     further: f64,
 ) -> LoopModel<f64> {
-    let delay = numbers.delay_ticks as f64 + further;
-    let (a, b) = (&certified.double.a, &certified.double.b);
-    let plant = PlantModel::delayed(a, b, tick_s, delay, &numbers.measured);
+    let delay = numbers.delay_ticks() as f64 + further;
+    let (a, b) = certified.double.driven();
+    let plant = PlantModel::delayed(&a, &b, tick_s, delay, &numbers.measured);
     LoopModel::of(&plant, &ControllerModel::of(numbers))
 }
 

@@ -26,6 +26,7 @@ mod covariance;
 mod encoder;
 mod error;
 mod imperfections;
+mod lag;
 mod linear;
 mod loop_model;
 mod margins;
@@ -63,6 +64,7 @@ pub use imperfections::{
     RequiredSurvival, SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections,
     survival,
 };
+pub use lag::LagLimits;
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;

@@ -149,7 +149,8 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         output: table.output,
         rig_hash: table.rig_hash,
         tick_s: exact.tick_s,
-        delay_ticks: table.delay_ticks,
+        pending_acts: exact.pending[0],
+        pending_stays: exact.pending[1],
         force_limit_n: f64::MAX,
         laws,
         observer: observer.map(|(single, exact)| ObserverGains {

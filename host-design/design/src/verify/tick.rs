@@ -30,8 +30,8 @@ pub struct TickLimits {
 
 /// The loop with the same table run every `period` seconds.
 pub(super) fn loop_at(certified: &Certified, numbers: &Numbers<f64>, period: f64) -> LoopModel<f64> {
-    let (a, b) = (&certified.double.a, &certified.double.b);
-    let plant = PlantModel::delayed(a, b, period, numbers.delay_ticks as f64, &numbers.measured);
+    let (a, b) = certified.double.driven();
+    let plant = PlantModel::delayed(&a, &b, period, numbers.delay_ticks() as f64, &numbers.measured);
     LoopModel::of(&plant, &ControllerModel::of(numbers))
 }
 
@@ -58,8 +58,8 @@ pub(super) fn limits(
     let longer = first_failure(unstable, |i| tick_s * 1.02f64.powi(i as i32), 172, 1e-9)?;
     let shorter = first_failure(unstable, |i| tick_s * 0.96f64.powi(i as i32), 84, 1e-9)?;
 
-    let (a, b) = (&certified.double.a, &certified.double.b);
-    let spread = integrated_quadratic(&a.transpose(), &(b * &b.transpose()), &tick_s);
+    let (a, b) = certified.double.driven();
+    let spread = integrated_quadratic(&a.transpose(), &(&b * &b.transpose()), &tick_s);
     let difference = |omega: f64| 2.0 * (0.5 * omega).sin();
     let (_, gain) = grid.maximum(|omega, r| {
         let (re, im): (Vec<f64>, Vec<f64>) = r.kick_to_force.iter().map(|h| (h.re, h.im)).unzip();

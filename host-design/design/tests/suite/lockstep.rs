@@ -107,7 +107,7 @@ fn what_cannot_be_in_lockstep_runs_alone_with_the_same_bits() {
     let quadruple = rig("quadruple-paper");
     let mut cases = random_plants(&quadruple, 5, 0.1);
     cases[1].0.reality.friction.joint_friction_n_m = PerJoint::all(5e-5);
-    cases[2].0.reality.driver.driver_lag_s = 1e-3;
+    cases[2].0.reality.driver.driver_lag_s = Some(1e-3);
     cases[3].1.substeps = 3;
     cases[4].0.reality.driver.latency_s = 1e-4;
     assert!(in_lockstep(&table(&quadruple), &cases) == alone(&table(&quadruple), &cases));

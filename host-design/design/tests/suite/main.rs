@@ -6,6 +6,7 @@ mod acceleration_imperfect;
 mod acceleration_motor;
 mod acceleration_servo;
 mod design_properties;
+mod driver_lag;
 mod homing;
 mod identify;
 mod identify_coverage;

@@ -228,7 +228,7 @@ fn small_imperfections_of_the_drive_change_little_and_large_ones_much() {
     };
     let belt = |compliance: f64| changed(&|real| real.drive_train.belt_compliance_m_per_n = compliance);
     let play = |backlash: f64| changed(&|real| real.drive_train.backlash_m = backlash);
-    let lag = |lag: f64| changed(&|real| real.driver.driver_lag_s = lag);
+    let lag = |lag: f64| changed(&|real| real.driver.driver_lag_s = Some(lag));
     let jitter = |jitter: f64| changed(&|real| real.driver.jitter_s = jitter);
     let force = |percent: f64| changed(&|real| real.driver.force_percent = percent);
     let mass = |percent: f64| changed(&|real| real.parameters.link_mass_percent = PerJoint::all(percent));

@@ -88,7 +88,7 @@ fn what_is_left_out_gets_its_documented_default() {
             gravity_m_per_s2: 9.81,
             input: CartInput::Force,
         }),
-        actuator: Actuator { force_limit_n: None, motor: None, acceleration: None },
+        actuator: Actuator::default(),
         tick: Tick { period_s: 0.001, delay_ticks: 0 },
         lqr: None,
         pole_placement: None,

@@ -238,7 +238,8 @@ fn every_row_of_verify_is_explained() {
     let folder = tempfile::tempdir().unwrap();
     let single = std::fs::read_to_string(rig_path("single-quanser-ip02")).unwrap();
     let tolerating = folder.path().join("tolerating.toml");
-    std::fs::write(&tolerating, format!("{single}\n[robust]\nmass_percent = 1\n")).unwrap();
+    let late = single.replace("[actuator]", "[actuator]\ndriver_lag_s = 0.02");
+    std::fs::write(&tolerating, format!("{late}\n[robust]\nmass_percent = 1\n")).unwrap();
     let reports =
         [tolerating.display().to_string(), with_motor(folder.path()), with_slow_servo(folder.path())]
             .map(|rig| upright(&["verify", &rig, "--law", "lqr", "--runs", "1"]));

@@ -17,7 +17,7 @@ pub(crate) static ACTUATOR: Section = Section {
     meaning: "with kind = \"force\": force limit and DC motor; if any motor key is given, the required motor keys must \
               be given. With kind = \"acceleration\": a stepper, see drives.md",
     absent: Absent::Follows("no limit, no motor"),
-    keys: &[KIND, FORCE_LIMIT, Motor::KEYS, AccelerationDrive::KEYS],
+    keys: &[KIND, FORCE, Motor::KEYS, AccelerationDrive::KEYS],
 };
 
 const KIND: &[Key] = &[Key {
@@ -29,13 +29,22 @@ const KIND: &[Key] = &[Key {
     absent: Absent::Follows("\"force\""),
 }];
 
-const FORCE_LIMIT: &[Key] = &[Key {
-    name: "force_limit_n",
-    unit: "N",
-    rule: Rule::POSITIVE,
-    meaning: "largest force on the cart",
-    absent: Absent::Follows("no limit"),
-}];
+const FORCE: &[Key] = &[
+    Key {
+        name: "force_limit_n",
+        unit: "N",
+        rule: Rule::POSITIVE,
+        meaning: "largest force on the cart",
+        absent: Absent::Follows("no limit"),
+    },
+    Key {
+        name: "driver_lag_s",
+        unit: "s",
+        rule: Rule::POSITIVE,
+        meaning: "lag of the force: time constant of the motor driver, or of the winding (inductance by resistance)",
+        absent: Absent::Follows("it follows at once"),
+    },
+];
 
 /// Accepted voltages of dead zone and bridge; the section's own code compares them with the supply.
 const BELOW_SUPPLY: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
@@ -46,6 +55,9 @@ const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 pub struct Actuator {
     /// Largest force on the cart (N); none: no limit.
     pub force_limit_n: Option<f64>,
+    /// Time constant (s) with which the force follows its command; none: at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub driver_lag_s: Option<f64>,
     /// The DC motor, if described.
     pub motor: Option<Motor>,
     /// The drive, if it imposes the cart's acceleration; then there is neither force limit nor motor.
@@ -192,7 +204,7 @@ pub(crate) fn actuator(node: &Node<'_>, tick: &Tick) -> Result<Actuator, RigErro
     let is_acceleration = kind.transpose()? == Some(1);
     let (foreign, accepts, remedy) = match is_acceleration {
         true => (
-            [FORCE_LIMIT, Motor::KEYS].concat(),
+            [FORCE, Motor::KEYS].concat(),
             "only with kind = \"force\"",
             "leave it out: a drive that imposes the acceleration applies whatever force that takes",
         ),
@@ -210,9 +222,16 @@ pub(crate) fn actuator(node: &Node<'_>, tick: &Tick) -> Result<Actuator, RigErro
         return Ok(Actuator { acceleration, ..Actuator::default() });
     }
     let force_limit_n = table.value("force_limit_n")?;
+    let driver_lag_s = table.value("driver_lag_s")?;
+    if let (Some(node), 1) = (table.get("driver_lag_s"), tick.delay_ticks) {
+        return Err(node.out_of_range(
+            "only with delay_ticks = 0",
+            "leave delay_ticks in [tick] out: a tick of delay beside a lag is not made up for",
+        ));
+    }
     let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());
     let motor = described.then(|| motor(&table)).transpose()?;
-    Ok(Actuator { force_limit_n, motor, acceleration: None })
+    Ok(Actuator { force_limit_n, driver_lag_s, motor, acceleration: None })
 }
 
 /// A tick needs room for pulses, and its pulses begin in the same tick.

@@ -70,7 +70,8 @@ keys! {
 keys! {
     /// Errors of motor driver and supply, and of the instants at which a force begins.
     pub struct DriverFaults {
-        driver_lag_s: f64, "s", Rule::NOT_NEGATIVE, "time constant of the motor driver", NONE;
+        driver_lag_s: Option<f64>, "s", Rule::NOT_NEGATIVE, "real time constant of the motor driver",
+            Absent::Follows("that of [actuator]");
         current_limit_a: Option<f64>, "A", Rule::POSITIVE, "largest current of the motor driver",
             Absent::Follows("no limit");
         supply_resistance_ohm: f64, "Ω", Rule::NOT_NEGATIVE,

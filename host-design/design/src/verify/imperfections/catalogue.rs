@@ -28,7 +28,7 @@ pub struct Imperfection {
 }
 
 impl Imperfection {
-    /// The machine of `rig` with this imperfection alone, of this size.
+    /// The machine of `rig` with this imperfection alone, of this size; a lag is that beyond the stated one.
     pub fn on(&self, rig: &Rig, size: f64) -> Rig {
         self.on_with(rig, size, None)
     }
@@ -41,6 +41,10 @@ impl Imperfection {
             reality.friction.presliding_rad = PerJoint::all(bristle_rad);
         }
         (self.set)(&mut reality, size);
+        if let (Some(real_s), Some(stated_s)) = (&mut reality.driver.driver_lag_s, rig.actuator.driver_lag_s)
+        {
+            *real_s += stated_s;
+        }
         Rig { reality, ..rig.clone() }
     }
 
@@ -172,10 +176,10 @@ pub static IMPERFECTIONS: [Imperfection; 11] = [
         unit: "s",
         typical: [5e-5, 1e-3],
         source: "L / R of small motors (0.18 mH / 2.6 Ω: 70 µs) to large ones",
-        remedy: "a driver with a current loop; more force_noise_n2_s",
+        remedy: "driver_lag_s in [actuator], which is made up for; a driver with a current loop",
         requirement: "runs with the motor on (driver_lag_s)",
         required: |verify| verify.driver_lag_s,
-        set: |reality, size| reality.driver.driver_lag_s = size,
+        set: |reality, size| reality.driver.driver_lag_s = Some(size),
     },
     Imperfection {
         key: "latency_s",

@@ -18,6 +18,7 @@ const ZERO_RAD: f64 = 0.005;
 pub(super) struct Cures<'a> {
     rig: &'a Rig,
     table: &'a TableValues,
+    law: Law,
     own: Uncertified,
     of_all: Vec<(String, TableValues)>,
 }
@@ -25,7 +26,7 @@ pub(super) struct Cures<'a> {
 impl<'a> Cures<'a> {
     pub(super) fn of(rig: &'a Rig, table: &'a TableValues, law: Law) -> Result<Self, VerifyError> {
         let own = Uncertified::sampled_alone(&rig.with_law_alone(law))?;
-        let mut cures = Self { rig, table, own, of_all: Vec::new() };
+        let mut cures = Self { rig, table, law, own, of_all: Vec::new() };
         let friction_n = rounded(FORCE_SHARE * rig.force_limit_n().unwrap_or_default(), 2);
         cures.of_all = [("cart_friction_n", friction_n), ("homing_error_rad", ZERO_RAD)]
             .into_iter()
@@ -50,7 +51,25 @@ impl<'a> Cures<'a> {
             key => key,
         };
         let own = [poor, (good * poor).sqrt()].map(|size| self.tolerating(key, rounded(size, 2)));
-        own.into_iter().flatten().chain(self.of_all.iter().cloned()).collect()
+        let stated = (key == "driver_lag_s").then(|| [2.0 * poor, poor].map(|lag_s| self.stating(lag_s)));
+        own.into_iter()
+            .chain(stated.into_iter().flatten())
+            .flatten()
+            .chain(self.of_all.iter().cloned())
+            .collect()
+    }
+
+    /// `[actuator]` with this lag of the driver (s), for which the law is designed; none if one is stated already, or
+    /// where none can be.
+    fn stating(&self, lag_s: f64) -> Option<(String, TableValues)> {
+        let is_free = self.rig.actuator.driver_lag_s.is_none() && self.rig.tick.delay_ticks == 0;
+        if !is_free || !self.rig.actuator.input().is_force() {
+            return None;
+        }
+        let mut rig = self.rig.with_law_alone(self.law);
+        rig.actuator.driver_lag_s = Some(lag_s);
+        let table = TableValues::of_uncertified(&rig, &Uncertified::sampled_alone(&rig).ok()?).ok()?;
+        Some((format!("actuator.driver_lag_s = {}", significant(lag_s, 2)), table))
     }
 
     /// `[robust]` with this tolerance, which widens the thresholds of fault detection; none if there is no such key.

@@ -88,6 +88,16 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.largest_bandwidth_hz?)))),
     },
     TrustQuantity {
+        name: "least driver lag",
+        meaning: "how short the lag of a force may really be that is made up for, before the loop is unstable",
+        values: One(|_, law| Some(milliseconds(law.linear.lag?.least_s, "0"))),
+    },
+    TrustQuantity {
+        name: "largest driver lag",
+        meaning: "how long it may really be",
+        values: One(|_, law| Some(milliseconds(law.linear.lag?.largest_s, "any"))),
+    },
+    TrustQuantity {
         name: "f32 gains",
         meaning: "largest rounding error of a gain in units in the last place (at most 0.5: all are correctly rounded), and \
                   the change of the spectral radius",
@@ -180,6 +190,11 @@ fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
     let angles: Vec<String> = states.iter().skip(2).step_by(2).map(|&angle| number(1e3 * angle)).collect();
     let cart_mm = number(1e3 * states[rig.output()]);
     format!("{} {}, cart {cart_mm} mm, angles {} mrad", input(rig).0, force(rig, force_n), angles.join(" "))
+}
+
+/// A time (s) in milliseconds; `none` if there is no limit.
+fn milliseconds(seconds: Option<f64>, none: &str) -> String {
+    seconds.map_or(none.to_owned(), |s| format!("{} ms", number(1e3 * s)))
 }
 
 fn limits(share: LimitShare) -> String {
