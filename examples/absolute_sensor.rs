@@ -1,18 +1,42 @@
-//! A board whose link has a sensor of its absolute angle, with 14 bits per turn: `cargo run --example absolute_sensor`.
+//! A board whose link has a sensor of its absolute angle, with 14 bits per turn, in frames as those of the AS5047:
+//! `cargo run --example absolute_sensor`.
 //!
 //! Shifted until it fills 16 bits, the sensor's reading wraps as a counter of 16 bits does. In the rig file, a turn
 //! then has 65,536 counts. As with a counter, half a turn between two ticks is too much.
+//!
+//! A frame that fails its check repeats the last reading; the third in a row is the fault *board*. The check finds
+//! every single wrong bit and a wire at 3.3 V, but not a wire at 0 V: that is a valid frame, of angle 0.
 
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::{CounterWidth, Encoders};
 
 /// Bits that the sensor has less than a counter.
 const SHIFT: u32 = 2;
+/// The sensor has found an error in a command.
+const ERROR_FLAG: u16 = 1 << 14;
+const ANGLE: u16 = ERROR_FLAG - 1;
+/// Bad frames in a row that are a fault.
+const MOST_BAD: u8 = 3;
+
+/// The angle in a frame, unless a bit is wrong: the first of the 16 bits makes their parity even.
+fn angle(frame: u16) -> Option<u16> {
+    (frame.count_ones() % 2 == 0 && frame & ERROR_FLAG == 0).then_some(frame & ANGLE)
+}
+
+/// The frame that a healthy sensor sends.
+fn frame(angle: u16) -> u16 {
+    angle | (angle.count_ones() as u16 % 2) << 15
+}
 
 /// A counter at the cart, and the sensor at the link.
 struct Machine {
     cart: u32,
+    /// What the bus has received in this tick.
+    frame: u16,
+    /// The last angle that was good.
     link: u16,
+    /// Bad frames in a row.
+    bad: u8,
 }
 
 impl Board<2> for Machine {
@@ -23,8 +47,13 @@ impl Board<2> for Machine {
     }
 
     fn inputs(&mut self) -> Inputs<2> {
+        match angle(self.frame) {
+            Some(angle) => (self.link, self.bad) = (angle, 0),
+            None => self.bad = self.bad.saturating_add(1),
+        }
         let raw_counts = [self.cart, u32::from(self.link << SHIFT)];
-        Inputs { raw_counts, supply_v: 24.0, contacts: Contacts::default() }
+        let contacts = Contacts { board_fault: self.bad >= MOST_BAD, ..Contacts::default() };
+        Inputs { raw_counts, supply_v: 24.0, contacts }
     }
 
     // A machine to look at: it has no motor, watchdog or clock.
@@ -38,14 +67,33 @@ impl Board<2> for Machine {
 }
 
 fn main() {
-    let mut machine = Machine { cart: 0, link: 0x3ffe };
+    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link: 0, bad: 0 };
     // As the firmware does it: homed once, and then read every tick.
     let mut encoders = Encoders::new(Machine::WIDTHS);
     encoders.home(&machine.inputs().raw_counts, &[0, 0]);
     for (reading, counts) in [(0x3fff, 4), (0, 8), (1, 12), (0x3fff, 4), (0x3000, -4094 * 4)] {
-        machine.link = reading;
+        machine.frame = frame(reading);
         encoders.update(&machine.inputs().raw_counts);
         println!("{reading:#06x}: {} counts from where it was homed", encoders.counts()[1]);
         assert_eq!(encoders.counts(), &[0, counts]);
     }
+
+    // One wrong bit, whichever, is found at every angle; without one, every angle arrives.
+    for reading in 0..=ANGLE {
+        assert_eq!(angle(frame(reading)), Some(reading));
+        assert!((0..16).all(|bit| angle(frame(reading) ^ 1 << bit).is_none()));
+    }
+    // The wire breaks and is pulled up: the reading stays, and the third tick is the fault. A good frame ends it.
+    let good = machine.frame;
+    for (frame, is_fault) in
+        [(0xffff, false), (0xffff, false), (good, false), (0xffff, false), (0xffff, false), (0xffff, true)]
+    {
+        machine.frame = frame;
+        let inputs = machine.inputs();
+        println!("{frame:#06x}: fault {}", inputs.contacts.board_fault);
+        encoders.update(&inputs.raw_counts);
+        assert_eq!((inputs.contacts.board_fault, encoders.counts()), (is_fault, &[0, -4094 * 4]));
+    }
+    // At 0 V, the frame is that of angle 0.
+    assert_eq!(angle(0), Some(0));
 }

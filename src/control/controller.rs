@@ -411,7 +411,8 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
 
     /// Updates the memory of the law at the end of a tick, if it has one; returns the force that acted during the tick
     /// (N).
-    #[inline]
+    // Out of line: a tick of a law without memory does not pay for it.
+    #[cold]
     fn advance(&mut self) -> T {
         let during_this_tick = self.respond();
         if self.active.has_memory {
