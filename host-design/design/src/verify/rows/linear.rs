@@ -146,8 +146,8 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
     },
     TrustQuantity {
         name: "of the limits",
-        meaning: "largest share, in those runs, of the limits at which the motor is turned off: a cart that uses most of its \
-                  rail at rest reaches its end within hours",
+        meaning: "largest share of each limit in those runs; a cart that uses most of its rail at rest reaches its end within \
+                  hours",
         values: One(|rig, law| {
             let ripple = law.noise_run.as_ref()?.ripple.as_ref().filter(|_| is_chain(rig))?;
             Some(limits(ripple.limit_share))
@@ -155,8 +155,8 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
     },
     TrustQuantity {
         name: "within [robust]",
-        meaning: "runs of 20 s with every combination of the wrong masses of `[robust]`, with all of its friction, wrong \
-                  zeros and latency, and the largest share of the limits in them",
+        meaning: "runs of 20 s with every combination of wrong masses of `[robust]`, with its friction, wrong zeros and \
+                  latency; largest share of each limit",
         values: One(|_, law| {
             let run = law.corner_noise.as_ref()?;
             let shares =
