@@ -20,7 +20,7 @@ const MOST_BAD: u8 = 3;
 
 /// The angle in a frame, unless a bit is wrong: the first of the 16 bits makes their parity even.
 fn angle(frame: u16) -> Option<u16> {
-    (frame.count_ones() % 2 == 0 && frame & ERROR_FLAG == 0).then_some(frame & ANGLE)
+    (frame.count_ones().is_multiple_of(2) && frame & ERROR_FLAG == 0).then_some(frame & ANGLE)
 }
 
 /// The frame that a healthy sensor sends.

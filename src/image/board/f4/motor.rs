@@ -133,7 +133,8 @@ impl Motor {
         let active = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
         self.timer.ccr1().write(|w| unsafe { w.bits(PERIOD - active.min(PERIOD - LEAST_PAUSE)) });
         let phase = if self.on { self.timer.cnt().read().bits() } else { WANTED_PHASE };
-        let nearer = WANTED_PHASE.clamp(phase.saturating_sub(LARGEST_SHIFT), phase + LARGEST_SHIFT);
+        // Not `clamp`, which can panic.
+        let nearer = WANTED_PHASE.max(phase.saturating_sub(LARGEST_SHIFT)).min(phase + LARGEST_SHIFT);
         // The update loads the compare value and the repetition counter and sets the counter to 0 (17.4.6: UG), where
         // the output is inactive: a safe moment to change the direction.
         self.timer.egr().write(|w| w.ug().set_bit());

@@ -69,7 +69,8 @@ keys! {
         belt_compliance_m_per_n: Option<f64>, "m/N", Rule::POSITIVE,
             "stretch of belt or gear per force that the loop has to survive as the only imperfection", NOT_REQUIRED;
         driver_lag_s: Option<f64>, "s", Rule::POSITIVE,
-            "time constant of the motor driver, beyond that of [actuator], that the loop has to survive as the only imperfection",
+            "time constant of the motor driver, beyond the stated one, that the loop has to survive as the only \
+             imperfection",
             NOT_REQUIRED;
         latency_s: Option<f64>, "s", Rule::POSITIVE.worded("a number > 0 and < period_s"),
             "additional delay of the force that the loop has to survive as the only imperfection", NOT_REQUIRED;
