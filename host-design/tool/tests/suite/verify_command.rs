@@ -130,8 +130,8 @@ fn a_cart_that_uses_most_of_its_rail_at_rest_is_refused_and_integral_action_brin
     let reality = "name = \"double-quanser-dbpen\"\nreality.joint_friction_n_m = 5e-4\n\
                    reality.cart_friction_n = 0.5\nreality.homing_error_rad = 3e-3\n";
     let refused = |more: &str, law: &str| {
-        let changed_name = ("name = \"double-quanser-dbpen\"", format!("{reality}{more}"));
-        let (_folder, path) = changed("double-quanser-dbpen", &[(changed_name.0, &changed_name.1)]);
+        let (name, machine) = ("name = \"double-quanser-dbpen\"", format!("{reality}{more}"));
+        let (_folder, path) = changed("double-quanser-dbpen", &[(name, &machine)]);
         let output = verify(&path, &["--json", "--runs", "1", "--law", law], None);
         failed(&object(&output)).iter().any(|line| line.contains("limit_percent"))
     };
