@@ -1,17 +1,15 @@
 //! A board whose link has a sensor of its absolute angle, with 14 bits per turn, in frames as those of the AS5047:
 //! `cargo run --example absolute_sensor`.
 //!
-//! Shifted until it fills 16 bits, the sensor's reading wraps as a counter of 16 bits does. In the rig file, a turn
-//! then has 65,536 counts. As with a counter, half a turn between two ticks is too much.
+//! `AbsoluteSensor` makes a counter of its readings that carries on where they wrap. Half a turn between two ticks is
+//! too much. In the rig file, the link has `sensor_bits = 14`.
 //!
 //! A frame that fails its check repeats the last reading; the third in a row is the fault *board*. The check finds
 //! every single wrong bit and a wire at 3.3 V, but not a wire at 0 V: that is a valid frame, of angle 0.
 
 use upright::board::{Board, Contacts, Inputs, Output};
-use upright::control::encoder::{CounterWidth, Encoders};
+use upright::control::encoder::{AbsoluteSensor, CounterWidth, Encoders};
 
-/// Bits that the sensor has less than a counter.
-const SHIFT: u32 = 2;
 /// The sensor has found an error in a command.
 const ERROR_FLAG: u16 = 1 << 14;
 const ANGLE: u16 = ERROR_FLAG - 1;
@@ -33,14 +31,15 @@ struct Machine {
     cart: u32,
     /// What the bus has received in this tick.
     frame: u16,
-    /// The last angle that was good.
-    link: u16,
+    /// The sensor with its last good angle.
+    link: AbsoluteSensor,
+    count: u32,
     /// Bad frames in a row.
     bad: u8,
 }
 
 impl Board<2> for Machine {
-    const WIDTHS: [CounterWidth; 2] = [CounterWidth::Bits32, CounterWidth::Bits16];
+    const WIDTHS: [CounterWidth; 2] = [CounterWidth::Bits32; 2];
 
     fn tick_s(&self) -> f32 {
         0.001
@@ -48,10 +47,10 @@ impl Board<2> for Machine {
 
     fn inputs(&mut self) -> Inputs<2> {
         match angle(self.frame) {
-            Some(angle) => (self.link, self.bad) = (angle, 0),
+            Some(angle) => (self.count, self.bad) = (self.link.count(angle.into()), 0),
             None => self.bad = self.bad.saturating_add(1),
         }
-        let raw_counts = [self.cart, u32::from(self.link << SHIFT)];
+        let raw_counts = [self.cart, self.count];
         let contacts = Contacts { board_fault: self.bad >= MOST_BAD, ..Contacts::default() };
         Inputs { raw_counts, supply_v: 24.0, contacts }
     }
@@ -67,11 +66,12 @@ impl Board<2> for Machine {
 }
 
 fn main() {
-    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link: 0, bad: 0 };
+    let link = AbsoluteSensor::new(14);
+    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link, count: 0, bad: 0 };
     // As the firmware does it: homed once, and then read every tick.
     let mut encoders = Encoders::new(Machine::WIDTHS);
     encoders.home(&machine.inputs().raw_counts, &[0, 0]);
-    for (reading, counts) in [(0x3fff, 4), (0, 8), (1, 12), (0x3fff, 4), (0x3000, -4094 * 4)] {
+    for (reading, counts) in [(0x3fff, 1), (0, 2), (1, 3), (0x3fff, 1), (0x3000, -4094)] {
         machine.frame = frame(reading);
         encoders.update(&machine.inputs().raw_counts);
         println!("{reading:#06x}: {} counts from where it was homed", encoders.counts()[1]);
@@ -92,7 +92,7 @@ fn main() {
         let inputs = machine.inputs();
         println!("{frame:#06x}: fault {}", inputs.contacts.board_fault);
         encoders.update(&inputs.raw_counts);
-        assert_eq!((inputs.contacts.board_fault, encoders.counts()), (is_fault, &[0, -4094 * 4]));
+        assert_eq!((inputs.contacts.board_fault, encoders.counts()), (is_fault, &[0, -4094]));
     }
     // At 0 V, the frame is that of angle 0.
     assert_eq!(angle(0), Some(0));

@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(12),
+    format: upright::table_format!(13),
     // Number of states; equal to `NX` in a sound table.
     states: 10,
     // Number of sensors; equal to `NY` in a sound table.
@@ -144,7 +144,12 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         middle_counts: 0,
         // Largest motion of each sensor within `arm_ticks` that is still slow (counts).
         slow_counts: [750, 20, 20, 20, 20],
-        // Reading of each sensor while the links hang at rest: half a turn for the first link, else 0 (counts).
+        // Largest motion of each sensor within `still_ticks` that is still: what noise or the edge of a step show
+        // (counts).
+        still_counts: [1, 1, 1, 1, 1],
+        // Reading of each absolute sensor while the links hang at rest; -1 for a sensor that only counts (counts).
+        zero_counts: [-1, -1, -1, -1, -1],
+        // Position of each sensor while the links hang at rest: half a turn for the first link, else 0 (counts).
         rest_counts: [0, 2048, 0, 0, 0],
         // A whole turn of each joint; 0 for the cart (counts).
         turn_counts: [0, 4096, 4096, 4096, 4096],
@@ -173,7 +178,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         },
     },
     // CRC-32 of all values above.
-    crc: 0x0e49_a274,
+    crc: 0x5a7e_328a,
 };
 
 /// This table has no swing-up.

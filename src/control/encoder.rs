@@ -1,4 +1,4 @@
-//! Incremental encoders: from raw counters of 16 or 32 bits to positions in SI units.
+//! Encoders: from raw counters of 16 or 32 bits, or readings of absolute sensors, to positions in SI units.
 
 use nalgebra::SVector;
 
@@ -83,6 +83,36 @@ impl<const NY: usize> Encoders<NY> {
     }
 }
 
+/// A sensor of a joint's absolute angle, as a counter that carries on where the sensor's reading wraps.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AbsoluteSensor {
+    /// Bits of a reading that are not used: see [`BITS`](Self::BITS).
+    unused: u32,
+    /// Bits of a counter beyond those of a turn.
+    beyond: u32,
+    count: u32,
+}
+
+impl AbsoluteSensor {
+    /// Most bits per turn that are used; of a finer sensor, the upper ones.
+    pub const BITS: u32 = 16;
+
+    /// A sensor with this many bits per turn.
+    pub const fn new(bits: u32) -> Self {
+        let unused = bits.saturating_sub(Self::BITS);
+        Self { unused, beyond: u32::BITS - (bits - unused), count: 0 }
+    }
+
+    /// The count for a reading. It is the reading, but for whole turns; between two readings, the joint must turn by
+    /// less than half a turn.
+    pub const fn count(&mut self, reading: u32) -> u32 {
+        let moved = (reading >> self.unused).wrapping_sub(self.count);
+        // Keeps the bits of a turn, with their sign.
+        self.count = self.count.wrapping_add(((moved << self.beyond) as i32 >> self.beyond) as u32);
+        self.count
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,6 +129,33 @@ mod tests {
                 position += step;
                 encoders.update(&raw(position));
                 prop_assert_eq!(encoders.counts(), &[position, position]);
+            }
+        }
+    }
+
+    /// Largest error (counts) of the positions of a link that turns over the wrap, with `modulo` taking readings.
+    fn error_over_the_wrap(bits: u32, mut modulo: impl FnMut(u32) -> u32) -> i32 {
+        let reading = |position: i32| (1000u32 << (bits - 12)).wrapping_add(position as u32) % (1 << bits);
+        let mut encoders = Encoders::new([CounterWidth::Bits16]);
+        encoders.home(&[modulo(reading(0))], &[0]);
+        let (unused, mut worst) = (bits.saturating_sub(16), 0);
+        for tick in 0..400 {
+            // Three turns forwards, and as many back.
+            let position = ((tick.min(400 - tick) * 3) << bits) / 200;
+            encoders.update(&[modulo(reading(position))]);
+            worst = worst.max((encoders.counts()[0] - (position >> unused)).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn a_link_turns_over_the_wrap_of_an_absolute_sensor() {
+        for bits in 12..=18 {
+            let mut sensor = AbsoluteSensor::new(bits);
+            assert!(error_over_the_wrap(bits, |reading| sensor.count(reading)) <= 1, "{bits}");
+            // Without the modulo, each pass of the wrap is off by a turn.
+            if bits < 16 {
+                assert!(error_over_the_wrap(bits, |reading| reading) >= 1 << bits, "{bits}");
             }
         }
     }

@@ -395,7 +395,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// A tick of homing by the limit switches.
     #[inline(never)]
     fn home_by_switches(&mut self, counts: &[i32; NY]) {
-        let found = self.calibration.update_rail_homing(counts, &self.contacts, &self.table.limits);
+        let found =
+            self.calibration.update_rail_homing(counts, &self.raw_counts, &self.contacts, &self.table.limits);
         match found.and_then(|position| Ok((position, self.drive_to_switches(counts)?))) {
             Ok((Some(position), true)) => self.home(&position),
             Ok(_) => {}

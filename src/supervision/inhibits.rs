@@ -46,6 +46,7 @@ inhibits! {
     22 NOT_SHAKEN "the rig is not being shaken: begin again";
     23 ZEROS "the links swing about different zeros every 5 s: let go of them, hold the cart";
     24 NO_TRANSITION "the gain table holds no motion from this equilibrium to that one";
+    25 OTHER_ZERO "a link hangs elsewhere than at its absolute sensor's zero: let it hang, or correct `sensor_zero_counts`";
 }
 
 impl Inhibits {
@@ -112,7 +113,7 @@ mod tests {
                 .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
                 .texts()
                 .count(),
-            25
+            26
         );
         assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
         assert_eq!(both.err_if_any(), Err(both));

@@ -23,6 +23,8 @@ const LIMITS: Limits<2> = Limits {
     travel_counts: [2000, 20],
     middle_counts: 7,
     slow_counts: [8, 9],
+    still_counts: [1; 2],
+    zero_counts: [-1; 2],
     rest_counts: [0, 2048],
     turn_counts: [0, 4096],
     sign_counts: [50, 130],

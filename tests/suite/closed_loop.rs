@@ -19,7 +19,8 @@ fn firmware_alone(scenario: &Scenario) -> Vec<[f64; STATES]> {
     (0..=ticks)
         .map(|_| {
             let state = core::array::from_fn(|i| bench.state()[i]);
-            bench.tick(controller.control(&bench.counters()).drive);
+            let counters = bench.counters();
+            bench.tick(controller.control(&counters).drive);
             controller.predict();
             state
         })

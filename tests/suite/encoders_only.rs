@@ -170,7 +170,8 @@ fn with_widths<const NX: usize, const NY: usize>(
     controller.set_setpoint(0.2).unwrap();
     let mut states = Vec::new();
     for _ in 0..3000 {
-        bench.tick(controller.control(&bench.counters()).drive);
+        let counters = bench.counters();
+        bench.tick(controller.control(&counters).drive);
         controller.predict();
         states.extend(bench.state().iter().map(|value| value.to_bits()));
         if bench.state()[2].abs() > 1.0 {

@@ -53,6 +53,9 @@ fn fields(rig: &Rig) -> Vec<Value> {
                 Some(LinkEncoder::StepRad(step)) => {
                     of_link("encoder_step_rad", "sensor", "rad/count", Some(step))
                 }
+                Some(LinkEncoder::Absolute { bits, .. }) => {
+                    of_link("sensor_bits", "sensor", "bits", Some(f64::from(bits)));
+                }
                 None => {}
             }
         }

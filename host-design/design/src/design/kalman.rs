@@ -27,7 +27,7 @@ pub struct Kalman<T> {
 
 /// Gains of the observer and the relative residual of the equation that they solve. Process noise has the intensities
 /// in `noise`, enters through the columns of `inputs` and is integrated over one tick (Van Loan). Each sensor has a
-/// rounding error with the variance of [`rounding_variances`].
+/// rounding error with the variance of [`sensor_variances`].
 ///
 /// The error covariance P of the prediction solves the sampled Riccati equation of (Adᵀ, Cᵀ);
 /// `L = P Cᵀ (C P Cᵀ + R)⁻¹` (Anderson & Moore, *Optimal Filtering*, chapter 4). With `observer_poles`, L follows from
@@ -56,7 +56,7 @@ pub(super) fn kalman<R: Real>(
             a.cols(),
             |i, j| if sensors[i].state == j { R::one() } else { R::zero() },
         );
-    let mut r = Matrix::from_diagonal(&rounding_variances(rig, &steps));
+    let mut r = Matrix::from_diagonal(&sensor_variances(rig, &steps));
     if rig.actuator.input() == CartInput::Acceleration {
         let measured: Vec<usize> = sensors.iter().map(|sensor| sensor.state).collect();
         add_rounded_motion(&mut r, inputs, &measured);
@@ -157,19 +157,26 @@ fn with_known_cart<R: Real>(
 /// Shortest tick (s) for which the rounding errors of successive counts of a chain's encoder are taken as independent.
 const WHITE_S: f64 = 1e-3;
 
-/// Variance of each sensor's rounding error, `step²/12`.
+/// Variance of each sensor's error: that of rounding, `step²/12`, and that of its noise.
 ///
 /// The filter takes the errors of successive ticks as independent. With ticks below 1 ms a link near rest often keeps
 /// its count, and with it the error: sampling more often then adds no information. So the variance of a chain's
-/// encoders is multiplied by 1 ms over the tick, which keeps the product of variance and tick constant.
-pub(super) fn rounding_variances<R: Real>(rig: &Rig, steps: &[R]) -> Vec<R> {
+/// encoders is multiplied by 1 ms over the tick, which keeps the product of variance and tick constant. Noise is new in
+/// every tick.
+pub(super) fn sensor_variances<R: Real>(rig: &Rig, steps: &[R]) -> Vec<R> {
     let twelve = R::from_f64(12.0);
     let is_correlated = rig.chain().is_some() && rig.tick.period_s < WHITE_S;
-    let variance = |step: &R| {
+    let variance = |(step, sensor): (&R, Sensor)| {
         let white = step.clone() * step / &twelve;
-        if is_correlated { white * &R::from_f64(WHITE_S) / &R::from_f64(rig.tick.period_s) } else { white }
+        let rounding = if is_correlated {
+            white * &R::from_f64(WHITE_S) / &R::from_f64(rig.tick.period_s)
+        } else {
+            white
+        };
+        let noise = R::from_f64(sensor.noise);
+        rounding + &(noise.clone() * &noise)
     };
-    steps.iter().map(variance).collect()
+    steps.iter().zip(rig.sensors()).map(variance).collect()
 }
 
 fn why_no_kalman<R: Real>(a_t: &Matrix<R>, c_t: &Matrix<R>) -> DesignError {

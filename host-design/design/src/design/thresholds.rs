@@ -1,7 +1,7 @@
 //! Thresholds of the innovation that indicate a faulty encoder or motor, from the Kalman filter's covariance.
 
 use super::Design;
-use super::kalman::rounding_variances;
+use super::kalman::sensor_variances;
 use super::pushed::pushed;
 use super::tolerated::Tolerated;
 use crate::rig::Rig;
@@ -73,7 +73,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
         .collect();
     let by_hand = pushed(rig, design, kalman, innovation[0]).unwrap_or_default();
     let push = by_hand.iter().zip(&innovation).map(|(by_hand, healthy)| healthy + by_hand).collect();
-    let rounding = rounding_variances(rig, steps);
+    let rounding = sensor_variances(rig, steps);
     let sensor = rig.actuator.input().motor_sensor();
     let frozen = (variances.iter().zip(steps).zip(rounding).zip(&tolerated.corrected)).map(
         |(((s, step), r), bound)| {

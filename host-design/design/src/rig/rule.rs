@@ -73,6 +73,19 @@ impl Rule {
     /// Encoder counts per revolution.
     pub(super) const COUNTS: Rule =
         Rule { accepts: "a number >= 2", admits: |x| x.iter().all(|&x| x >= 2.0) };
+    /// Bits of an absolute sensor.
+    pub(super) const BITS: Rule = Rule {
+        accepts: "a whole number from 12 to 18",
+        admits: |x| x.iter().all(|&x| (12.0..=18.0).contains(&x) && x.fract() == 0.0),
+    };
+    /// Whole and not negative.
+    pub(super) const WHOLE: Rule =
+        Rule { accepts: "a whole number >= 0", admits: |x| x.iter().all(|&x| x >= 0.0 && x.fract() == 0.0) };
+    /// Noise of an angle with which a link still can be told to be still (rad).
+    pub(super) const NOISE: Rule = Rule {
+        accepts: "a number from 0 to 0.005 (rad)",
+        admits: |x| x.iter().all(|&x| (0.0..=0.005).contains(&x)),
+    };
     /// A delay of no tick or of one tick.
     pub(super) const ZERO_OR_ONE: Rule =
         Rule { accepts: "0 or 1", admits: |x| x.iter().all(|&x| x == 0.0 || x == 1.0) };

@@ -1,5 +1,7 @@
 //! The sensors of a rig.
 
+use upright::control::encoder::AbsoluteSensor;
+
 use super::description::Rig;
 use super::sections::chain::PlantDescription;
 use super::sections::link::LinkEncoder;
@@ -10,6 +12,11 @@ use crate::numerics::Real;
 pub struct Sensor {
     /// Index of the state.
     pub state: usize,
+    /// Noise besides rounding, root mean square (unit of the state).
+    pub noise: f64,
+    /// If it is an absolute sensor of an angle, bits per turn and reading while the links hang (counts), of those that
+    /// are used.
+    pub absolute: Option<[u32; 2]>,
     resolution: Resolution,
 }
 
@@ -20,6 +27,31 @@ enum Resolution {
 }
 
 impl Sensor {
+    /// A sensor of this state that counts steps of this size.
+    const fn of_step(state: usize, step: f64) -> Self {
+        Self { state, noise: 0.0, absolute: None, resolution: Resolution::Step(step) }
+    }
+
+    fn of_link(state: usize, encoder: LinkEncoder) -> Self {
+        match encoder {
+            LinkEncoder::StepRad(step) => Self::of_step(state, step),
+            LinkEncoder::CountsPerRev(counts) => {
+                Self { resolution: Resolution::CountsPerRev(counts), ..Self::of_step(state, 0.0) }
+            }
+            LinkEncoder::Absolute { bits, zero_counts, noise_rad } => {
+                let used = u32::from(bits).min(AbsoluteSensor::BITS);
+                let zero = zero_counts >> (u32::from(bits) - used);
+                let resolution = Resolution::CountsPerRev(f64::from(1u32 << used));
+                Self { state, noise: noise_rad, absolute: Some([used, zero]), resolution }
+            }
+        }
+    }
+
+    /// Variance of its error: that of rounding, `step²/12`, and that of its noise.
+    pub fn variance(&self) -> f64 {
+        self.step::<f64>().powi(2) / 12.0 + self.noise.powi(2)
+    }
+
     /// Travel per count (m, rad, or the unit of the state), in the precision of `R`: 2π over the counts is not exact
     /// in `f64`.
     pub fn step<R: Real>(&self) -> R {
@@ -38,15 +70,9 @@ impl Rig {
             PlantDescription::Chain(chain) => {
                 // A drive that imposes the motion counts its own steps.
                 let step_m = self.actuator.acceleration.as_ref().map(|drive| drive.step_m);
-                let cart = step_m
-                    .or(chain.cart.encoder_step_m)
-                    .map(|step| Sensor { state: 0, resolution: Resolution::Step(step) });
+                let cart = step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_step(0, step));
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {
-                    let resolution = match description.encoder? {
-                        LinkEncoder::StepRad(step) => Resolution::Step(step),
-                        LinkEncoder::CountsPerRev(counts) => Resolution::CountsPerRev(counts),
-                    };
-                    Some(Sensor { state: 2 + 2 * link, resolution })
+                    description.encoder.map(|encoder| Sensor::of_link(2 + 2 * link, encoder))
                 });
                 cart.into_iter().chain(links).collect()
             }
@@ -54,7 +80,7 @@ impl Rig {
                 .measured
                 .iter()
                 .zip(&model.measured_steps)
-                .map(|(&state, &step)| Sensor { state, resolution: Resolution::Step(step) })
+                .map(|(&state, &step)| Sensor::of_step(state, step))
                 .collect(),
         }
     }

@@ -5,7 +5,7 @@ use crate::design::{
 };
 use crate::numerics::Matrix;
 use crate::reality::first_mass;
-use crate::rig::{Rig, Tolerances};
+use crate::rig::{Rig, Sensor, Tolerances};
 use crate::verify::{
     ControllerModel, Disturbance, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary,
     wrong_masses,
@@ -44,13 +44,12 @@ impl<'a> LinearPlants<'a> {
         };
         let intensities: Vec<f64> = (0..inputs.cols()).map(intensity).collect();
         let spread = &(&inputs * &Matrix::from_diagonal(&intensities)) * &inputs.transpose();
-        let square = |sensor: &crate::rig::Sensor| sensor.step::<f64>().powi(2) / 12.0;
         Ok(Self {
             rig,
             tolerances,
             nominal: held(rig, &design.driven_sampled(&period_s)),
             process: integrated_quadratic(&design.a.transpose(), &spread, &period_s),
-            sensor_variances: rig.sensors().iter().map(square).collect(),
+            sensor_variances: rig.sensors().iter().map(Sensor::variance).collect(),
         })
     }
 

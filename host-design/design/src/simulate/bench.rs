@@ -8,6 +8,7 @@ use upright::control::encoder::CounterWidth;
 
 use super::error::SimulationError;
 use super::scenario::Scenario;
+use super::sensor::{SimulatedSensor, nearest};
 use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
 use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
 use crate::rig::{AccelerationDrive, Chain, PlantDescription, Rig};
@@ -46,7 +47,7 @@ pub struct Bench {
     driver: Option<Driver>,
     timing: Timing,
     encoders: Option<RealEncoders>,
-    sensors: Vec<(usize, f64)>,
+    sensors: Vec<SimulatedSensor>,
     counter_start: u32,
     random: Pcg64,
     force_noise_n: f64,
@@ -99,7 +100,7 @@ impl Bench {
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
-            sensors: rig.sensors().iter().map(|sensor| (sensor.state, sensor.step())).collect(),
+            sensors: SimulatedSensor::all(rig),
             counter_start: scenario.counter_start,
             random: Pcg64::seed_from_u64(scenario.seed),
             force_noise_n: noise(scenario.force_noise_n)?,
@@ -159,24 +160,27 @@ impl Bench {
     }
 
     /// Writes the readings of the hardware counters into `counters`; entries without a sensor keep their value.
-    pub fn read_counters(&self, counters: &mut [u32]) {
-        for index in 0..counters.len().min(self.sensors.len()) {
+    pub fn read_counters(&mut self, counters: &mut [u32]) {
+        for (index, (counter, sensor)) in counters.iter_mut().zip(&mut self.sensors).enumerate() {
             if index == 0 && self.step_m.is_some() {
-                counters[0] = Self::reading(0, self.counter_start.wrapping_add(self.pulses as u32));
+                *counter = Self::reading(0, self.counter_start.wrapping_add(self.pulses as u32));
                 continue;
             }
-            let (state, step) = self.sensors[index];
-            let position = match &self.encoders {
+            let state = sensor.state;
+            let mut position = match &self.encoders {
                 Some(errors) => errors.measured(state, self.state[state]),
                 None => self.state[state],
             };
-            let counts = nearest(position / step);
-            counters[index] = Self::reading(index, self.counter_start.wrapping_add(counts as u32));
+            if sensor.noise > 0.0 {
+                let normal: f64 = StandardNormal.sample(&mut self.random);
+                position += sensor.noise * normal;
+            }
+            *counter = Self::reading(index, sensor.count(position, self.counter_start));
         }
     }
 
     /// As [`Bench::read_counters`], for as many sensors as the firmware has.
-    pub fn counters<const NY: usize>(&self) -> [u32; NY] {
+    pub fn counters<const NY: usize>(&mut self) -> [u32; NY] {
         let mut counters = [0; NY];
         self.read_counters(&mut counters);
         counters
@@ -185,7 +189,8 @@ impl Bench {
     /// Writes the readings of the counters at position 0 into `counters`.
     pub fn read_counters_at_zero(&self, counters: &mut [u32]) {
         for (index, counter) in counters.iter_mut().enumerate() {
-            *counter = Self::reading(index, self.counter_start);
+            let at_zero = self.sensors.get(index).map(|sensor| sensor.at_zero(self.counter_start));
+            *counter = Self::reading(index, at_zero.unwrap_or(self.counter_start));
         }
     }
 
@@ -387,26 +392,4 @@ fn pulses_at(state: &[f64], step_m: Option<f64>, servo_lag_s: Option<f64>) -> i6
 fn servo_lag_s(rig: &Rig) -> Option<f64> {
     let described = rig.actuator.acceleration.as_ref()?;
     rig.reality.step_motor.bandwidth_hz.or(described.bandwidth_hz).map(AccelerationDrive::lag_at)
-}
-
-/// The nearest integer; of two equally near ones, that away from 0.
-#[inline]
-fn nearest(value: f64) -> i64 {
-    // Adds the largest number below a half: adding a half would round up a value just below a half.
-    (value + 0.499_999_999_999_999_94_f64.copysign(value)) as i64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::nearest;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn counts_are_rounded_as_by_the_library(value in -1e9..1e9f64, counts in -1_000_000..1_000_000i64, ulps in -2..3i64) {
-            prop_assert_eq!(nearest(value), libm::round(value) as i64);
-            let half = f64::from_bits((counts as f64 + 0.5).to_bits().wrapping_add_signed(ulps));
-            prop_assert_eq!(nearest(half), libm::round(half) as i64);
-        }
-    }
 }

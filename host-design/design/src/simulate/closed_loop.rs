@@ -111,7 +111,7 @@ impl<'a> ClosedLoopRun<'a> {
             return Err(SimulationError::FullState);
         }
         controller.select(scenario.law)?;
-        let bench = Bench::new(rig, scenario)?;
+        let mut bench = Bench::new(rig, scenario)?;
         let (mut counters, mut at_zero) = (vec![0; sensors], vec![0; sensors]);
         let measured = single(bench.state());
         match scenario.sensing {

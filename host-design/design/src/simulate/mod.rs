@@ -24,6 +24,7 @@ mod hand_push;
 mod lockstep;
 mod motion;
 mod scenario;
+mod sensor;
 mod summary;
 mod trace;
 

@@ -104,7 +104,7 @@ struct Follow<'a> {
 impl WithSize for Follow<'_> {
     type Output = Result<Extremes, SimulationError>;
 
-    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
+    fn run<const NX: usize, const NY: usize, const N: usize>(mut self) -> Self::Output {
         let table = self.table.table::<NX, NY>();
         let others = self.swing_up.transitions();
         // Of the other motions only the one that is run: the firmware checks every word of its table.

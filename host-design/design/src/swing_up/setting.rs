@@ -82,8 +82,8 @@ impl<'a> Setting<'a> {
         let drive = rig.actuator.acceleration.as_ref();
         let steps: Vec<f64> = sensors.iter().map(|sensor| sensor.step()).collect();
         let rules = rig.swing_up.clone().unwrap_or_default();
-        let rounding = |(sensor, step): (&Sensor, &f64)| (sensor.state, step * step / 12.0);
-        let noise = noise(chain, kalman, &rules, sensors.iter().zip(&steps).map(rounding).collect());
+        let errors = |sensor: &Sensor| (sensor.state, sensor.variance());
+        let noise = noise(chain, kalman, &rules, sensors.iter().map(errors).collect());
         let weights = Matrix::from_f64_rows(&lqr.weights().0);
         let (states, input_weight) = (rig.states(), lqr.force_weight);
         let at_rest = |at: Equilibrium| -> Result<AtRest, SwingUpError> {

@@ -12,6 +12,10 @@ const SIGN_RAD: f64 = 0.2;
 /// … and of the cart (share of the rail).
 const SIGN_SHARE: f64 = 0.05;
 
+/// Motion of a noisy sensor that is still, in standard deviations of its noise: readings of two ticks differ by more
+/// once in a million ticks.
+const STILL_DEVIATIONS: f64 = 7.0;
+
 /// Limits of `rig`, whose sensors have these steps (m or rad). Without steps there are no limits in counts.
 pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits<MAX_SENSORS>, NoTable> {
     let wanted = &rig.limits;
@@ -61,8 +65,11 @@ fn set_limits_of_chain(
     // The count of a drive with pulses has the sign of the pulses.
     let has_encoder = rig.actuator.acceleration.is_none();
     limits.sign_counts[0] = if has_encoder { counts(SIGN_SHARE * length, cart).max(1) } else { 0 };
-    for (joint, &step) in joints.iter().enumerate() {
-        let sensor = joint + 1;
+    for ((sensor, &step), description) in (1..).zip(joints).zip(rig.sensors().iter().skip(1)) {
+        if let Some([_, zero]) = description.absolute {
+            limits.zero_counts[sensor] = zero as i32;
+            limits.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
+        }
         limits.slow_counts[sensor] = slow(wanted.arm_rate_rad_per_s, step);
         limits.sign_counts[sensor] = counts(SIGN_RAD, step).max(1);
         limits.turn_counts[sensor] = counts(core::f64::consts::TAU, step).max(1);

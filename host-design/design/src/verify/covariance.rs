@@ -22,8 +22,8 @@ pub struct NoiseShare {
 /// Shares of all sources, the total last; none without `[kalman]`.
 ///
 /// The covariance P of the loop driven by white noise of covariance Q per tick solves `P = M P Mᵀ + Q`; summed by
-/// doubling, `P ← P + M P Mᵀ, M ← M²`. An encoder's rounding error is taken as white, of variance step²/12;
-/// intensities are integrated over the tick (Van Loan).
+/// doubling, `P ← P + M P Mᵀ, M ← M²`. An encoder's rounding error is taken as white, of variance step²/12,
+/// as is its noise; intensities are integrated over the tick (Van Loan).
 pub(super) fn covariance(
     rig: &Rig,
     certified: &Certified,
@@ -46,8 +46,8 @@ pub(super) fn covariance(
         Ok(())
     };
     if let Some(kalman) = certified.double.kalman.as_ref().filter(|_| from_encoders) {
-        for (i, step) in kalman.steps.entries().iter().enumerate().skip(first) {
-            let variance = step * step / 12.0;
+        for (i, (step, sensor)) in kalman.steps.entries().iter().zip(rig.sensors()).enumerate().skip(first) {
+            let variance = step * step / 12.0 + sensor.noise * sensor.noise;
             let f = model.sensor_input.block(0, i, size, 1);
             let d = model.sensor_to_force[(0, i)];
             add(format!("encoder {}", i + 1), &(&f * &f.transpose()).scaled(&variance), d * d * variance)?;

@@ -1,6 +1,9 @@
 //! The coarsest encoders with which a law still survives.
 
+use core::f64::consts::TAU;
+
 use serde::Serialize;
+use upright::control::encoder::AbsoluteSensor;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
@@ -55,7 +58,8 @@ pub struct CoarsestEncoder {
     pub counts_per_rev: Vec<f64>,
 }
 
-/// The rig with encoders `factor` times coarser. Counts per revolution stay whole, and at least 2.
+/// The rig with encoders `factor` times coarser. Counts per revolution stay whole, and at least 2. An absolute sensor
+/// keeps its bits and has more noise: its whole error is `factor` times as large.
 pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     let mut coarse = rig.clone();
     match &mut coarse.plant {
@@ -67,6 +71,10 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
                     LinkEncoder::CountsPerRev(counts) => {
                         LinkEncoder::CountsPerRev((counts / factor).round().max(2.0))
                     }
+                    LinkEncoder::Absolute { bits, zero_counts, noise_rad } => {
+                        let noise_rad = more_noise(bits, noise_rad, factor);
+                        LinkEncoder::Absolute { bits, zero_counts, noise_rad }
+                    }
                 });
             }
         }
@@ -75,6 +83,12 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
         }
     }
     coarse
+}
+
+/// Noise (rad) with which the whole error of an absolute sensor, with its rounding, is `factor` times as large.
+fn more_noise(bits: u8, noise_rad: f64, factor: f64) -> f64 {
+    let rounding = (TAU / f64::from(bits.min(AbsoluteSensor::BITS as u8)).exp2()).powi(2) / 12.0;
+    (factor * factor * (noise_rad * noise_rad + rounding) - rounding).max(0.0).sqrt()
 }
 
 /// `own` with the observer for `rig`, which differs from the rig of `own` in its encoders alone. The observer is not
@@ -130,7 +144,8 @@ pub fn coarsest_encoder(
             .iter()
             .filter_map(|link| match link.encoder? {
                 LinkEncoder::CountsPerRev(counts) => Some(counts),
-                LinkEncoder::StepRad(step) => Some(core::f64::consts::TAU / step),
+                LinkEncoder::StepRad(step) => Some(TAU / step),
+                LinkEncoder::Absolute { bits, .. } => Some(f64::from(bits).exp2()),
             })
             .collect(),
     })

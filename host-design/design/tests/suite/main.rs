@@ -1,5 +1,6 @@
 //! Tests of rig files, plant, design, simulation and verification. One program, so that linking happens once.
 
+mod absolute_sensors;
 mod acceleration;
 mod acceleration_firmware;
 mod acceleration_imperfect;

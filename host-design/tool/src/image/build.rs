@@ -62,6 +62,9 @@ pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
 /// As for [`build`].
 pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
     check_board(kind, table.sensors(), rig.tick.period_s, table.steps.as_ref())?;
+    if kind.board().is_some() {
+        counts_all(table)?;
+    }
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
@@ -97,6 +100,12 @@ fn check_board(
     let most = board.most_pulses_hz(tick_s);
     let rate = steps.map_or(0.0, |steps| f64::from(steps.speed_limit_m_per_s) / f64::from(steps.step_m));
     if rate > most { Err(BuildError::Pulses { board, most, rate }) } else { Ok(()) }
+}
+
+/// Checks that the table's rig has encoders alone.
+pub(super) fn counts_all(table: &TableValues) -> Result<(), BuildError> {
+    let absolute = table.limits.zero_counts.iter().position(|&zero| zero >= 0);
+    absolute.map_or(Ok(()), |link| Err(BuildError::AbsoluteSensor { link }))
 }
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler

@@ -33,6 +33,15 @@ pub enum BuildError {
         /// Number of the rig's sensors.
         needed: usize,
     },
+    /// A link has an absolute sensor.
+    #[error(
+        "the boards of this project read encoders, and link {link} has an absolute sensor (sensor_bits): write a board \
+         that reads it (docs/own-board.md)"
+    )]
+    AbsoluteSensor {
+        /// The first such link, from 1.
+        link: usize,
+    },
     /// The board cannot make the rig's tick.
     #[error(
         "{board} makes ticks of {} to {} ms, and this rig's is {} ms: change tick.period_s (docs/board.md)",

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source, write_atomically};
 
-use super::build::{PROFILE, images, one_at_a_time};
+use super::build::{PROFILE, counts_all, images, one_at_a_time};
 use super::compiler::{Compiler, compiler_for_chips};
 use super::error::BuildError;
 use super::pico_board::PicoBoard;
@@ -28,6 +28,7 @@ pub struct PicoImage {
 /// [`BuildError`] if the board cannot run this rig, there is no compiler, or it fails.
 pub fn build_pico(board: PicoBoard, rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildError> {
     check(board, table.sensors(), rig.tick.period_s, table.swing_up.is_some(), table.steps.as_ref())?;
+    counts_all(table)?;
     let name = format!(
         "{}-{:016x}-{:08x}-{:08x}",
         board.name(),

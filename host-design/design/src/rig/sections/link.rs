@@ -97,6 +97,27 @@ const LINK_KEYS: &[Key] = &[
         meaning: "resolution of the encoder after quadrature (four counts per line)",
         absent: Absent::Follows("what encoder_step_rad gives; neither, no encoder"),
     },
+    Key {
+        name: "sensor_bits",
+        unit: "bits",
+        rule: Rule::BITS,
+        meaning: "resolution of an absolute sensor, instead of an encoder; the upper 16 are used",
+        absent: Absent::Follows("no absolute sensor"),
+    },
+    Key {
+        name: "sensor_zero_counts",
+        unit: "counts",
+        rule: Rule::WHOLE.worded("a whole number from 0 to below 2^sensor_bits"),
+        meaning: "what this sensor reads while the links hang at rest",
+        absent: Absent::Numbers(&[0.0]),
+    },
+    Key {
+        name: "sensor_noise_rad",
+        unit: "rad",
+        rule: Rule::NOISE,
+        meaning: "noise of this sensor besides the rounding to its bits, root mean square",
+        absent: Absent::Numbers(&[0.0]),
+    },
 ];
 
 /// One link of a chain, `[[link]]`.
@@ -123,6 +144,15 @@ pub enum LinkEncoder {
     StepRad(f64),
     /// `encoder_counts_per_rev`: counts per revolution; the step is 2π / counts (rad).
     CountsPerRev(f64),
+    /// `sensor_bits`: an absolute sensor.
+    Absolute {
+        /// Bits per turn.
+        bits: u8,
+        /// `sensor_zero_counts`: reading while the links hang (counts).
+        zero_counts: u32,
+        /// `sensor_noise_rad`: noise besides rounding (rad, root mean square).
+        noise_rad: f64,
+    },
 }
 
 /// Keys of measurements of a link, which become the fields of [`Link`] when a file is read. A program that writes those
@@ -238,9 +268,34 @@ fn within_reach(table: &Table<'_>, centre_of_mass_m: Option<f64>, length_m: f64)
 
 fn link_encoder(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
     table.not_both("encoder_step_rad", "encoder_counts_per_rev", "keep the one the data sheet gives")?;
+    table.not_both("encoder_step_rad", "sensor_bits", "keep the one that the board reads")?;
+    table.not_both("encoder_counts_per_rev", "sensor_bits", "keep the one that the board reads")?;
+    if let Some(absolute) = absolute_sensor(table)? {
+        return Ok(Some(absolute));
+    }
     let step: Option<f64> = table.value("encoder_step_rad")?;
     let counts: Option<f64> = table.value("encoder_counts_per_rev")?;
     Ok(step.map(LinkEncoder::StepRad).or(counts.map(LinkEncoder::CountsPerRev)))
+}
+
+fn absolute_sensor(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
+    let Some(bits) = table.value::<Option<f64>>("sensor_bits")? else {
+        let needs_bits =
+            ["sensor_zero_counts", "sensor_noise_rad"].iter().any(|key| table.get(key).is_some());
+        return match needs_bits {
+            true => Err(table.missing("sensor_bits", "the bits per turn of the absolute sensor")),
+            false => Ok(None),
+        };
+    };
+    let zero_counts: f64 = table.value("sensor_zero_counts")?;
+    let turn = bits.exp2();
+    if zero_counts >= turn {
+        let accepts = format!("a whole number from 0 to {}", turn - 1.0);
+        let remedy = "give what the sensor reads while the links hang, or correct sensor_bits";
+        return Err(table.required("sensor_zero_counts")?.out_of_range(&accepts, remedy));
+    }
+    let noise_rad = table.value("sensor_noise_rad")?;
+    Ok(Some(LinkEncoder::Absolute { bits: bits as u8, zero_counts: zero_counts as u32, noise_rad }))
 }
 
 #[cfg(test)]

@@ -1,0 +1,82 @@
+//! A sensor of the simulated rig, up to the count that the firmware reads.
+
+use std::f64::consts::PI;
+
+use upright::control::encoder::AbsoluteSensor;
+
+use crate::rig::{Rig, Sensor};
+
+/// A sensor as the board reads it: an encoder with its counter, or an absolute sensor.
+pub(super) struct SimulatedSensor {
+    /// Index of the state that it measures.
+    pub(super) state: usize,
+    /// Its noise, root mean square (unit of the state).
+    pub(super) noise: f64,
+    step: f64,
+    absolute: Option<Absolute>,
+}
+
+/// An absolute sensor, and what the board makes of its readings.
+struct Absolute {
+    /// Readings in a turn.
+    turn: u32,
+    /// Reading at position 0, and the count that the board has made of it at power-up.
+    zero: u32,
+    at_zero: u32,
+    board: AbsoluteSensor,
+}
+
+impl SimulatedSensor {
+    /// The sensors of a rig.
+    pub(super) fn all(rig: &Rig) -> Vec<Self> {
+        rig.sensors().iter().map(Self::of).collect()
+    }
+
+    fn of(sensor: &Sensor) -> Self {
+        let step: f64 = sensor.step();
+        let absolute = sensor.absolute.map(|[bits, hanging]| {
+            // The first link hangs half a turn from position 0.
+            let rest = if sensor.state == 2 { nearest(PI / step) } else { 0 };
+            let (turn, mut board) = (1 << bits, AbsoluteSensor::new(bits));
+            let zero = hanging.wrapping_sub(rest as u32) % turn;
+            Absolute { turn, zero, at_zero: board.count(zero), board }
+        });
+        Self { state: sensor.state, noise: sensor.noise, step, absolute }
+    }
+
+    /// The count at this position (unit of the state), noise included. A counter reads `counter_start` at 0.
+    pub(super) fn count(&mut self, position: f64, counter_start: u32) -> u32 {
+        let counts = nearest(position / self.step) as u32;
+        match &mut self.absolute {
+            None => counter_start.wrapping_add(counts),
+            Some(absolute) => absolute.board.count(absolute.zero.wrapping_add(counts) % absolute.turn),
+        }
+    }
+
+    /// The count at position 0.
+    pub(super) fn at_zero(&self, counter_start: u32) -> u32 {
+        self.absolute.as_ref().map_or(counter_start, |absolute| absolute.at_zero)
+    }
+}
+
+/// The nearest integer; of two equally near ones, that away from 0.
+#[inline]
+pub(super) fn nearest(value: f64) -> i64 {
+    // Adds the largest number below a half: adding a half would round up a value just below a half.
+    (value + 0.499_999_999_999_999_94_f64.copysign(value)) as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn counts_are_rounded_as_by_the_library(value in -1e9..1e9f64, counts in -1_000_000..1_000_000i64, ulps in -2..3i64) {
+            prop_assert_eq!(nearest(value), libm::round(value) as i64);
+            let half = f64::from_bits((counts as f64 + 0.5).to_bits().wrapping_add_signed(ulps));
+            prop_assert_eq!(nearest(half), libm::round(half) as i64);
+        }
+    }
+}

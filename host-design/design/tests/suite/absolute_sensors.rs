@@ -1,0 +1,101 @@
+//! Absolute sensors at the joints: their zero instead of homing, their noise, and their wrap-around.
+
+use core::f64::consts::PI;
+
+use upright::protocol::message::{Answer, Request};
+use upright::supervision::inhibits::Inhibits;
+use upright::supervision::supervisor::State;
+use upright::table::Law;
+use upright_design::design::detection_thresholds;
+use upright_design::harness::{Harness, record, with_firmware};
+use upright_design::rig::{LinkEncoder, Rig};
+use upright_design::simulate::Scenario;
+use upright_design::verify::linear;
+
+use crate::published::{certified, rig, table};
+use crate::supervised::{ALL_RIGS, ask, tick};
+
+/// Reading while the links hang: the first link wraps on its way up, and all of them near upright or hanging.
+const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
+
+/// A rig of `rigs/` with sensors of 14 bits, and this noise.
+fn absolute(name: &str, noise_rad: f64) -> Rig {
+    let mut rig = rig(name);
+    for (link, zero_counts) in rig.chain_mut().unwrap().links.iter_mut().zip(ZEROS) {
+        link.encoder = Some(LinkEncoder::Absolute { bits: 14, zero_counts, noise_rad });
+    }
+    rig
+}
+
+#[test]
+fn the_firmware_raises_and_balances_every_rig_with_absolute_sensors() {
+    for (name, noise_rad) in ALL_RIGS.iter().zip([4e-4, 2e-4, 1e-4, 2e-5]) {
+        let rig = absolute(name, noise_rad);
+        let values = table(&rig);
+        assert_eq!(values.limits.zero_counts[..2], [-1, 3], "{name}");
+        let scenario = Scenario { duration_s: 3.0, ..Scenario::at_rest(&rig, Law::Lqr) };
+        let run = with_firmware(&values, |firmware| record(&rig, &values, &scenario, firmware));
+        let run = run.unwrap().unwrap();
+        assert!(run.fault.is_none() && run.summary.survives(), "{name}: {:?} {}", run.fault, run.summary);
+    }
+}
+
+/// What the firmware answers to homing while the single pendulum hangs with its sensor this far from its zero (rad),
+/// and the angle from upright that it then knows (rad).
+fn homed(rig: &Rig, off_rad: f64) -> (Answer, f64) {
+    let values = table(rig);
+    let scenario = Scenario::at_rest(rig, Law::Lqr);
+    let run = with_firmware(&values, |target| {
+        let mut harness = Harness::new(rig, &values, &scenario, target).unwrap();
+        for _ in 0..300 {
+            harness.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
+            tick(&mut harness);
+        }
+        harness.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
+        let answer = ask(&mut harness, Request::Home);
+        harness.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
+        for _ in 0..3 {
+            let inputs = harness.inputs();
+            harness.session.tick(&inputs).unwrap();
+        }
+        let last = std::iter::from_fn(|| harness.session.next_telemetry()).last().unwrap();
+        let is_homed = harness.session.status().state == State::Calibrated;
+        assert_eq!(is_homed, matches!(answer, Answer::Done), "{answer:?}");
+        (answer, f64::from(last.counts[1]) * rig.sensors()[1].step::<f64>())
+    });
+    run.unwrap()
+}
+
+#[test]
+fn homing_takes_the_angle_of_an_absolute_sensor_and_refuses_one_that_does_not_hang() {
+    let (own, counts) = (absolute("single-quanser-ip02", 0.0), rig("single-quanser-ip02"));
+    // Held 3 degrees from hanging: the sensor knows it, a counter takes it for hanging.
+    let (_, angle) = homed(&own, 0.05);
+    assert!((angle - PI - 0.05).abs() < 4e-4, "{angle}");
+    let (_, angle) = homed(&counts, 0.05);
+    assert!((angle - PI).abs() < 1e-3, "{angle}");
+    // Held 7 degrees from it, or with the zero of another position.
+    assert_eq!(homed(&own, 0.12).0, Answer::NotNow(Inhibits::OTHER_ZERO));
+    assert_eq!(homed(&own, -0.12).0, Answer::NotNow(Inhibits::OTHER_ZERO));
+    assert_eq!(homed(&counts, 0.12).0, Answer::Done);
+}
+
+#[test]
+fn noise_of_a_sensor_reaches_observer_thresholds_and_verify() {
+    let (quiet, noisy) = (absolute("single-quanser-ip02", 0.0), absolute("single-quanser-ip02", 1e-3));
+    let mut counts = quiet.clone();
+    counts.chain_mut().unwrap().links[0].encoder = Some(LinkEncoder::CountsPerRev(16_384.0));
+    let of = |rig: &Rig| {
+        let design = &certified(rig).double;
+        let threshold = detection_thresholds(rig, design).unwrap().innovation[1];
+        (design.kalman.as_ref().unwrap().l_filter[(2, 1)], threshold)
+    };
+    let [(gain, threshold), (quiet_gain, quiet_threshold)] = [&noisy, &quiet].map(of);
+    assert_eq!((quiet_gain, quiet_threshold), of(&counts));
+    assert!(gain < 0.7 * quiet_gain && threshold > 3.0 * quiet_threshold, "{gain} {threshold}");
+    let ripple = |rig: &Rig| {
+        let noise = linear(rig, certified(rig), &table(rig)).unwrap().remove(0).noise.unwrap();
+        noise.iter().find(|share| share.source == "encoder 2").unwrap().states[2]
+    };
+    assert!(ripple(&noisy) > 2.0 * ripple(&quiet), "{} {}", ripple(&noisy), ripple(&quiet));
+}
