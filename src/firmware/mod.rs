@@ -47,6 +47,7 @@ use crate::supervision::debounce::Debounce;
 use crate::supervision::detection::Detection;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::WrongTravel;
+use crate::supervision::inhibits::Inhibits;
 use crate::supervision::jog::{Jog, MotorSign};
 use crate::supervision::shaking::Shaker;
 use crate::supervision::slow_drive::SlowDrive;
@@ -286,7 +287,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
         let counts = *self.controller.encoders().counts();
-        self.calibration.update(&counts, &self.table.limits);
+        let still = self.table.absolute.as_ref().map_or(&[1; NY], |absolute| &absolute.still_counts);
+        self.calibration.update(&counts, still, &self.table.limits);
         counts
     }
 
@@ -395,16 +397,25 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// A tick of homing by the limit switches.
     #[inline(never)]
     fn home_by_switches(&mut self, counts: &[i32; NY]) {
-        let found =
-            self.calibration.update_rail_homing(counts, &self.raw_counts, &self.contacts, &self.table.limits);
+        let found = self.calibration.update_rail_homing(counts, &self.contacts, &self.table.limits);
         match found.and_then(|position| Ok((position, self.drive_to_switches(counts)?))) {
-            Ok((Some(position), true)) => self.home(&position),
+            Ok((Some(position), true)) => {
+                if let Ok(position) = self.by_zeros(position) {
+                    self.home(&position);
+                }
+            }
             Ok(_) => {}
             Err(WrongTravel) => {
                 self.supervisor.disarm();
                 self.let_go();
             }
         }
+    }
+
+    /// `position`, where the links hang, with the positions of absolute sensors by their own zeros.
+    fn by_zeros(&self, position: [i32; NY]) -> Result<[i32; NY], Inhibits> {
+        let Some(absolute) = &self.table.absolute else { return Ok(position) };
+        absolute.positions(&position, &self.raw_counts, &self.table.limits).ok_or(Inhibits::OTHER_ZERO)
     }
 
     fn home(&mut self, position: &[i32; NY]) {

@@ -48,9 +48,9 @@ impl<const NY: usize> Calibration<NY> {
         *self = Self::new(limits);
     }
 
-    /// Takes the counts of a tick with the motor off.
-    pub fn update(&mut self, counts: &[i32; NY], limits: &Limits<NY>) {
-        self.still.update(counts, &limits.still_counts);
+    /// Takes the counts of a tick with the motor off; `still` is the largest motion of each sensor that is still (counts).
+    pub fn update(&mut self, counts: &[i32; NY], still: &[i32; NY], limits: &Limits<NY>) {
+        self.still.update(counts, still);
         self.slow.update(counts, &limits.slow_counts);
     }
 
@@ -65,17 +65,12 @@ impl<const NY: usize> Calibration<NY> {
         self.swinging.update(counts, steps, &limits.turn_counts, tick_s);
     }
 
-    /// Position of each sensor (counts) for homing here, where the counters read `raw`: the cart is at 0, and the links
-    /// hang still or swing about hanging.
+    /// Position of each sensor (counts) for homing here: the cart is at 0, and the links hang still or swing about
+    /// hanging.
     ///
     /// # Errors
     /// The inhibits of homing.
-    pub fn hanging(
-        &self,
-        counts: &[i32; NY],
-        raw: &[u32; NY],
-        limits: &Limits<NY>,
-    ) -> Result<[i32; NY], Inhibits> {
+    pub fn hanging(&self, counts: &[i32; NY], limits: &Limits<NY>) -> Result<[i32; NY], Inhibits> {
         let mut home = limits.rest_counts;
         match self.swinging.zeros() {
             Ok(zeros) => {
@@ -86,10 +81,10 @@ impl<const NY: usize> Calibration<NY> {
             }
             Err(inhibits) => inhibits.when(!self.is_still(limits)).err_if_any()?,
         }
-        limits.by_zeros(&home, raw).ok_or(Inhibits::OTHER_ZERO)
+        Ok(home)
     }
 
-    /// Whether nothing has moved by more than [`Limits::still_counts`] for [`Limits::still_ticks`], as homing requires.
+    /// Whether nothing has moved by more than is still for [`Limits::still_ticks`], as homing requires.
     pub fn is_still(&self, limits: &Limits<NY>) -> bool {
         self.still.ticks() >= limits.still_ticks
     }
@@ -125,7 +120,6 @@ impl<const NY: usize> Calibration<NY> {
     pub fn update_rail_homing(
         &mut self,
         counts: &[i32; NY],
-        raw: &[u32; NY],
         contacts: &Contacts,
         limits: &Limits<NY>,
     ) -> Result<Option<[i32; NY]>, WrongTravel> {
@@ -134,7 +128,7 @@ impl<const NY: usize> Calibration<NY> {
         self.homing = if found.is_err() { Homing::WrongTravel } else { self.rail.progress() };
         let off_the_switches = !(contacts.limit_low || contacts.limit_high);
         Ok(found?.filter(|_| off_the_switches).and_then(|position| {
-            let mut home = self.hanging(counts, raw, limits).ok()?;
+            let mut home = self.hanging(counts, limits).ok()?;
             if let Some(cart) = home.first_mut() {
                 *cart = position;
             }

@@ -1,6 +1,7 @@
 //! The gain table of a rig, and its check.
 
 use crate::numbers::Scalar;
+use crate::table::absolute::AbsoluteZeros;
 use crate::table::checksum;
 use crate::table::error::TableError;
 use crate::table::format::TABLE_FORMAT;
@@ -52,6 +53,8 @@ part! {
         pub limits: Limits<NY>,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault.
         pub thresholds: Thresholds<NY>,
+        /// Absolute sensors, if there are any.
+        pub absolute: Option<AbsoluteZeros<NY>>,
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above, see [`GainTable::checksum`].
         pub crc,
@@ -106,7 +109,8 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && self.steps.iter().all(StepMap::is_sound)
             && !(self.steps.is_some() && (self.motor.is_some() || self.pending_acts > 0.0))
             && self.limits.is_sound()
-            && self.thresholds.is_sound();
+            && self.thresholds.is_sound()
+            && self.absolute.iter().all(|absolute| absolute.is_sound(&self.limits));
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }

@@ -38,11 +38,6 @@ part! {
         pub middle_counts: i32,
         /// Largest motion of each sensor within `arm_ticks` that is still slow (counts).
         pub slow_counts: [i32; NY],
-        /// Largest motion of each sensor within `still_ticks` that is still: what noise or the edge of a step show
-        /// (counts).
-        pub still_counts: [i32; NY],
-        /// Reading of each absolute sensor while the links hang at rest; -1 for a sensor that only counts (counts).
-        pub zero_counts: [i32; NY],
         /// Position of each sensor while the links hang at rest: half a turn for the first link, else 0 (counts).
         pub rest_counts: [i32; NY],
         /// A whole turn of each joint; 0 for the cart (counts).
@@ -70,8 +65,6 @@ impl<const NY: usize> Limits<NY> {
             travel_counts: [0; 2],
             middle_counts: 0,
             slow_counts: [i32::MAX; NY],
-            still_counts: [1; NY],
-            zero_counts: [-1; NY],
             rest_counts: [0; NY],
             turn_counts: [0; NY],
             sign_counts: [0; NY],
@@ -83,15 +76,13 @@ impl<const NY: usize> Limits<NY> {
         let [low, high] = self.rail_m;
         let ticks =
             [self.supply_ticks, self.saturated_ticks, self.link_ticks, self.arm_ticks, self.still_ticks];
-        let counts = [&self.slow_counts, &self.still_counts, &self.turn_counts, &self.sign_counts];
-        let zeros = || self.zero_counts.iter().zip(&self.turn_counts);
+        let counts = [&self.slow_counts, &self.turn_counts, &self.sign_counts];
         low < high
             && [self.angle_rad, self.speed_m_per_s, self.arm_angle_rad].iter().all(|limit| *limit > 0.0)
             && self.supply_min_v >= 0.0
             && self.jog_force_n >= 0.0
             && ticks.iter().all(|&ticks| ticks > 0)
             && counts.into_iter().flatten().chain(&self.travel_counts).all(|&counts| counts >= 0)
-            && zeros().all(|(&zero, &turn)| zero >= -1 && zero < turn.max(1))
     }
 
     /// `counts` with whole turns removed from each joint, so that it is within half a turn of 0.
@@ -104,29 +95,6 @@ impl<const NY: usize> Limits<NY> {
             }
         }
         wrapped
-    }
-
-    /// `home`, the positions of the sensors where the links hang, with those of absolute sensors, which read `raw`, by
-    /// their own zeros; none if such a sensor is off by more than half of `sign_counts`, so that its link does not hang
-    /// or its zero is another one.
-    pub fn by_zeros(&self, home: &[i32; NY], raw: &[u32; NY]) -> Option<[i32; NY]> {
-        let mut own = *home;
-        for (((own, &raw), &zero), &rest) in
-            own.iter_mut().zip(raw).zip(&self.zero_counts).zip(&self.rest_counts)
-        {
-            if zero >= 0 {
-                *own = (raw as i32).wrapping_sub(zero).wrapping_add(rest);
-            }
-        }
-        let mut by_zeros = *home;
-        let away = self.away(&own, home);
-        for ((position, &away), &enough) in by_zeros.iter_mut().zip(&away).zip(&self.sign_counts) {
-            if away.unsigned_abs() > enough.unsigned_abs() / 2 {
-                return None;
-            }
-            *position = position.wrapping_add(away);
-        }
-        Some(by_zeros)
     }
 
     /// Counts at rest `at` an equilibrium. The first sensor is the cart's, and every joint has one.
@@ -190,8 +158,6 @@ mod tests {
             travel_counts: [2000, 20],
             middle_counts: 0,
             slow_counts: [1; 3],
-            still_counts: [1; 3],
-            zero_counts: [-1; 3],
             rest_counts: [0, 2048, 0],
             turn_counts: [0, 4096, 4095],
             sign_counts: [50, 130, 130],
@@ -206,19 +172,6 @@ mod tests {
             assert_eq!(limits.within_half_a_turn(&raised), [5000, 7, -9]);
         }
         assert_eq!(limits.within_half_a_turn(&[-5000, 2047, 2046]), [-5000, 2047, 2046]);
-    }
-
-    #[test]
-    fn an_absolute_sensor_gives_its_own_position_and_is_refused_far_from_hanging() {
-        let limits = Limits { zero_counts: [-1, 4000, -1], ..limits() };
-        let home = |raw: u32| limits.by_zeros(&[0, 2048, 0], &[77, raw, 99]);
-        assert_eq!(home(4000), Some([0, 2048, 0]));
-        assert_eq!(home(4060), Some([0, 2108, 0]));
-        // 60 counts back over the wrap of the sensor, three turns on.
-        assert_eq!(home(3940 + 3 * 4096), Some([0, 1988, 0]));
-        // A fortieth of a turn is too far; a sensor that only counts takes where the links hang.
-        assert_eq!((home(4070), home(3930), home(4000 + 2048)), (None, None, None));
-        assert_eq!(super::tests::limits().by_zeros(&[0, 2048, 0], &[77, 12, 99]), Some([0, 2048, 0]));
     }
 
     #[test]
@@ -238,8 +191,5 @@ mod tests {
         assert!(unsound(&|l| l.speed_m_per_s = 0.0));
         assert!(unsound(&|l| l.arm_ticks = 0));
         assert!(unsound(&|l| l.turn_counts[1] = -1));
-        assert!(unsound(&|l| l.still_counts[1] = -1));
-        assert!(unsound(&|l| l.zero_counts[1] = 4096));
-        assert!(unsound(&|l| l.zero_counts[1] = -2));
     }
 }

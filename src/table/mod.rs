@@ -15,6 +15,7 @@
 //! # Ok::<(), TableError>(())
 //! ```
 
+mod absolute;
 mod chain_model;
 pub mod checksum;
 mod columns;
@@ -33,6 +34,7 @@ mod swing_up;
 mod thresholds;
 
 pub use crate::numbers::{Number, Scalar};
+pub use absolute::AbsoluteZeros;
 pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
 pub use columns::columns;

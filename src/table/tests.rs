@@ -23,8 +23,6 @@ const LIMITS: Limits<2> = Limits {
     travel_counts: [2000, 20],
     middle_counts: 7,
     slow_counts: [8, 9],
-    still_counts: [1; 2],
-    zero_counts: [-1; 2],
     rest_counts: [0, 2048],
     turn_counts: [0, 4096],
     sign_counts: [50, 130],
@@ -85,6 +83,7 @@ fn full() -> GainTable<4, 2> {
         steps: None,
         limits: LIMITS,
         thresholds: THRESHOLDS,
+        absolute: Some(AbsoluteZeros { zero_counts: [-1, 17], still_counts: [1, 3] }),
         crc: 0,
     };
     table.crc = table.checksum();

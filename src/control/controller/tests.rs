@@ -31,6 +31,7 @@ fn table() -> GainTable<2, 1> {
         steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
+        absolute: None,
         crc: 0,
     };
     table.crc = table.checksum();

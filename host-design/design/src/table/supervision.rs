@@ -1,6 +1,6 @@
 //! Limits and thresholds of the supervisor, from the rig file to the firmware's types.
 
-use upright::table::{Limits, MotorTest, Thresholds};
+use upright::table::{AbsoluteZeros, Limits, MotorTest, Thresholds};
 
 use super::any_size::MAX_SENSORS;
 use super::error::{NoTable, finite};
@@ -65,11 +65,8 @@ fn set_limits_of_chain(
     // The count of a drive with pulses has the sign of the pulses.
     let has_encoder = rig.actuator.acceleration.is_none();
     limits.sign_counts[0] = if has_encoder { counts(SIGN_SHARE * length, cart).max(1) } else { 0 };
-    for ((sensor, &step), description) in (1..).zip(joints).zip(rig.sensors().iter().skip(1)) {
-        if let Some([_, zero]) = description.absolute {
-            limits.zero_counts[sensor] = zero as i32;
-            limits.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
-        }
+    for (joint, &step) in joints.iter().enumerate() {
+        let sensor = joint + 1;
         limits.slow_counts[sensor] = slow(wanted.arm_rate_rad_per_s, step);
         limits.sign_counts[sensor] = counts(SIGN_RAD, step).max(1);
         limits.turn_counts[sensor] = counts(core::f64::consts::TAU, step).max(1);
@@ -78,6 +75,18 @@ fn set_limits_of_chain(
         *rest = counts(core::f64::consts::PI, step);
     }
     Ok(())
+}
+
+/// Zeros of the absolute sensors of `rig`, whose sensors have these steps; none if it has no such sensor.
+pub(super) fn absolute_zeros(rig: &Rig, steps: &[f64]) -> Option<AbsoluteZeros<MAX_SENSORS>> {
+    let mut zeros = AbsoluteZeros { zero_counts: [-1; MAX_SENSORS], still_counts: [1; MAX_SENSORS] };
+    for (sensor, (description, &step)) in rig.sensors().iter().zip(steps).enumerate() {
+        if let Some([_, zero]) = description.absolute {
+            zeros.zero_counts[sensor] = zero as i32;
+            zeros.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
+        }
+    }
+    zeros.zero_counts.iter().any(|&zero| zero >= 0).then_some(zeros)
 }
 
 /// Thresholds of a design; without one, thresholds that nothing exceeds.

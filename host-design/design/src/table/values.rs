@@ -125,6 +125,7 @@ impl TableValues {
                 .transpose()?,
             limits: supervision::limits(rig, steps)?,
             thresholds: supervision::thresholds(detection.as_ref()),
+            absolute: supervision::absolute_zeros(rig, steps),
             crc: 0,
         };
         let values = Self { rig: rig.name.clone(), swing_up: None, widest };

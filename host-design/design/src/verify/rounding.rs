@@ -168,6 +168,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
+        absolute: None,
         crc: 0,
     }
 }

@@ -104,8 +104,8 @@ fn check_board(
 
 /// Checks that the table's rig has encoders alone.
 pub(super) fn counts_all(table: &TableValues) -> Result<(), BuildError> {
-    let absolute = table.limits.zero_counts.iter().position(|&zero| zero >= 0);
-    absolute.map_or(Ok(()), |link| Err(BuildError::AbsoluteSensor { link }))
+    let link = table.absolute.and_then(|absolute| absolute.zero_counts.iter().position(|&zero| zero >= 0));
+    link.map_or(Ok(()), |link| Err(BuildError::AbsoluteSensor { link }))
 }
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler
