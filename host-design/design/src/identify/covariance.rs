@@ -9,8 +9,9 @@ use super::record::Record;
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Factor on the speed of a cart that never sticks: its friction shows it better than the length of a bristle.
 const CREEPING: f64 = 1.1;
-/// Factor on the excess of the friction at rest, if there is one.
-const OTHER_EXCESS: f64 = 0.5;
+/// Factor on the excess of the friction at rest, if there is one, and the excess of the other contacts, which may have
+/// one that is hardly seen.
+const OTHER_EXCESS: (f64, f64) = (0.5, 0.15);
 /// Iterations of each refit.
 const ITERATIONS: usize = 2;
 /// Terms that are added in quadrature to a statistical deviation.
@@ -66,7 +67,8 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
     }
     if filter.model.excess != [0.0; 2] {
         let mut model = filter.model.clone();
-        model.excess = model.excess.map(|excess| OTHER_EXCESS * excess);
+        let other = |excess: f64| if excess > 0.0 { OTHER_EXCESS.0 * excess } else { OTHER_EXCESS.1 };
+        model.excess = model.excess.map(other);
         let other = Filter { model: &model, ..*filter };
         widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
     }

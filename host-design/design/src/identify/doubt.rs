@@ -1,5 +1,6 @@
 //! What casts doubt on an identification that may be written nevertheless.
 
+use super::model::Model;
 use super::parameters::ParameterKind;
 use crate::number::significant;
 
@@ -22,6 +23,8 @@ pub enum Doubt {
     },
     /// The friction of the cart or of the joints at rest is larger than in motion, by these shares.
     LargerAtRest([f64; 2]),
+    /// The cart never sticks: its friction is about constant only above this speed (m/s).
+    NeverSticks(f64),
     /// A step of the drive that imposes the cart's motion moves it by another distance than the file says.
     Travel {
         /// Travel per step, as a multiple of that of the file.
@@ -41,9 +44,10 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// What the excesses of the friction at rest of cart and joints say, if there are any.
-    pub(super) fn of_excess(excess: [f64; 2]) -> Option<Self> {
-        (excess != [0.0; 2]).then_some(Doubt::LargerAtRest(excess))
+    /// What the model's law of friction says, if it is not that of the simulated machine of a rig file.
+    pub(super) fn of_friction(model: &Model) -> impl Iterator<Item = Self> {
+        let larger = (model.excess != [0.0; 2]).then_some(Doubt::LargerAtRest(model.excess));
+        larger.into_iter().chain(model.creeping.map(Doubt::NeverSticks))
     }
 }
 
@@ -71,6 +75,12 @@ impl core::fmt::Display for Doubt {
                  frictions above are those in motion; give breakaway_percent in [reality].",
                 100.0 * cart,
                 100.0 * joints
+            ),
+            Doubt::NeverSticks(speed) => write!(
+                f,
+                "The cart never sticks: below about {} mm/s its dry friction falls with the speed. The law of friction is not that \
+                 of the simulated machine, whose cart comes to rest where this one creeps.",
+                significant(1e3 * speed, 2)
             ),
             Doubt::Travel { share, deviation } => write!(
                 f,

@@ -175,7 +175,7 @@ fn with_friction_laws(filter: &Filter<'_>, p: Vec<f64>, noise: &[f64]) -> (Model
     model.smoothing = filter.smoothing(&p, noise);
     // With more links the search takes minutes.
     if model.layout.links <= 2 {
-        model.excess = at_rest::excess(&Filter { model: &model, ..*filter }, &p, noise);
+        model = at_rest::with_excess(&Filter { model: &model, ..*filter }, &p, noise);
     }
     let creeping = creeping::found(&Filter { model: &model, ..*filter }, &p, noise);
     creeping.unwrap_or((model, p))
@@ -219,7 +219,7 @@ impl Fitted<'_> {
         let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
         // Noise and smoothing were tuned for the parameters before this fit.
         let (model, p) = with_friction_laws(&filter, p, &noise);
-        found.doubts.extend(Doubt::of_excess(model.excess));
+        found.doubts.extend(Doubt::of_friction(&model));
         let filter = Filter { model: &model, ..filter };
         let noise = filter.tuned(&p);
         let (p, normal) = filter.fit(&p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;

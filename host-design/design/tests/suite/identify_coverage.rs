@@ -1,10 +1,10 @@
 //! Machines that differ from their file, and how many of the stated intervals cover the truth.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use upright_design::identify::{
-    CoverageError, CoveredQuantity, Drawn, DrawnMachine, Missed, ParameterKind, TrueFriction, coverage,
-    identified,
+    CoverageError, CoveredQuantity, Doubt, Drawn, DrawnMachine, Missed, ParameterKind, Settings,
+    TrueFriction, coverage, identified, identify, shake,
 };
 use upright_design::rig::{FrictionLaw, Rig};
 use upright_design::study::Study;
@@ -104,4 +104,41 @@ fn a_rig_without_encoders_has_no_coverage() {
     }
     let found = coverage(&file, &DRAWN, &Study::whole(), &|| ());
     assert!(matches!(found, Err(CoverageError::Identify(_))), "{found:?}");
+}
+
+/// What casts doubt on the identification of drawn machine `number` with this law of friction.
+fn doubts(law: TrueFriction, number: u64) -> Vec<Doubt> {
+    let file = rig("single-quanser-ip02");
+    let machine = DrawnMachine::draw(&file, 10.0, law, 5, number).unwrap();
+    let log = shake(&machine.rig, 12.0, number).unwrap();
+    let settings = Settings { trust_wiring: true, ..Settings::default() };
+    identify(&file, &[(PathBuf::from("run.log"), log)], &settings, &|_| ()).unwrap().doubts
+}
+
+#[test]
+fn a_law_of_friction_that_is_not_that_of_the_file_is_named() {
+    // The negative control: nothing is said of the law of the file.
+    assert_eq!(doubts(TrueFriction::OfFile, 0), []);
+    let never_sticks =
+        |doubt: &Doubt| matches!(doubt, Doubt::NeverSticks(speed) if (0.001..0.02).contains(speed));
+    let creeping = doubts(TrueFriction::Tanh, 0);
+    assert!(creeping.iter().any(never_sticks), "{creeping:?}");
+    for law in [TrueFriction::Stribeck, TrueFriction::LuGre] {
+        let found = doubts(law, 0);
+        assert!(matches!(found[..], [Doubt::LargerAtRest([cart, _])] if cart > 0.1), "{law:?}: {found:?}");
+    }
+}
+
+#[test]
+fn friction_that_falls_with_another_speed_than_usual_is_found() {
+    let drawn = Drawn { friction: TrueFriction::LuGre, seconds: 20.0, seed: 1, ..DRAWN };
+    let one = identified(&rig("single-quanser-ip02"), &drawn, 9).unwrap();
+    for quantity in [CoveredQuantity::CartDry, CoveredQuantity::CartViscous] {
+        let missed = one.missed.iter().find(|missed| missed.quantity == quantity).unwrap();
+        let deviation = missed.deviation.unwrap();
+        // With the usual speed, the errors are 3 and 2 deviations.
+        assert!(missed.error.abs() < deviation, "{missed:?}");
+        // The negative control: the interval is not so wide that it would cover anything.
+        assert!(deviation < 0.03, "{missed:?}");
+    }
 }
