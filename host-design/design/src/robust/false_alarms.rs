@@ -89,7 +89,7 @@ pub fn false_alarms(
     let one = |number: u64| -> Result<(u64, Healthy), VerifyError> {
         let found = balance(&machines.machine(rig, number), table, law, number, seconds);
         done();
-        Ok((number, found.map_err(|error| VerifyError::Firmware(error.to_string()))?))
+        Ok((number, found?))
     };
     let all = study.outcomes(law.key(), machines.count(rig), one)?;
     let hours = all.iter().map(|(_, one)| one.balanced_s).sum::<f64>() / 3600.0;

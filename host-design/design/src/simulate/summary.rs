@@ -33,6 +33,9 @@ pub enum FallKind {
     NotFinite,
     /// The firmware turned the motor off, with this fault.
     MotorOff(Fault),
+    /// The firmware never let the motor balance: it refused to arm, or the motor could not push the cart to check its
+    /// sign.
+    NotArmed,
 }
 
 impl Fall {
@@ -75,6 +78,7 @@ impl fmt::Display for FallKind {
             Self::Diverged => f.write_str("the state diverged"),
             Self::NotFinite => f.write_str("the state is no longer finite"),
             Self::MotorOff(fault) => write!(f, "fault {fault}"),
+            Self::NotArmed => f.write_str("not armed"),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What a trust report cannot say, and why.
 
 use crate::design::DesignError;
+use crate::harness::HarnessError;
 use crate::rig::{Chain, Rig};
 use crate::simulate::SimulationError;
 use crate::study::StudyError;
@@ -26,7 +27,7 @@ pub enum VerifyError {
     NoTable(#[from] NoTable),
     /// The firmware does not run.
     #[error("the firmware does not run: {0}")]
-    Firmware(String),
+    Firmware(HarnessError),
     /// The runs of another process cannot be used.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -46,6 +47,15 @@ pub enum VerifyError {
         /// The accepted values.
         accepts: &'static str,
     },
+}
+
+impl From<HarnessError> for VerifyError {
+    fn from(error: HarnessError) -> Self {
+        match error {
+            HarnessError::Simulation(error) => Self::Simulation(error),
+            error => Self::Firmware(error),
+        }
+    }
 }
 
 /// The chain of a rig that has one.

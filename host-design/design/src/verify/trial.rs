@@ -1,11 +1,15 @@
 //! One run of the firmware's controller against the plant, reduced to what a verdict needs.
 
 use serde::{Deserialize, Serialize};
+use upright::board::Output;
+use upright::protocol::KEEP_ALIVE;
+use upright::protocol::message::Request;
 use upright::table::Law;
 
-use crate::plant::absolute_angles;
+use crate::harness::{Harness, HarnessError, with_firmware};
+use crate::plant::{absolute_angles, without_turns};
 use crate::rig::{CartInput, Rig};
-use crate::simulate::{Fall, Job, Sample, Scenario, SimulationError, run, run_all};
+use crate::simulate::{Fall, FallKind, Job, Sample, Scenario, SimulationError, run, run_all, ticks};
 use crate::study::infinite_if_null;
 use crate::table::TableValues;
 
@@ -38,6 +42,9 @@ impl Disturbance {
         }
     }
 }
+
+/// Time from one telemetry message to the next while a verdict is awaited (s): a fault is known within it.
+const TELEMETRY_S: f64 = 0.02;
 
 /// Duration of a run without disturbances, and what counts as being back near rest at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -152,6 +159,72 @@ pub fn trial(
     let mut outcome = Outcome::NOTHING_SEEN;
     let fall = run(rig, table, scenario, &mut |sample| outcome.see(rig, horizon, sample))?;
     Ok(outcome.ended(fall))
+}
+
+/// [`trial`] with the whole firmware, from power-up on: the rig is homed, its signs are checked, and it is armed and
+/// let go as by hand.
+///
+/// # Errors
+/// [`HarnessError`] if the firmware does not run.
+pub(super) fn trial_from_power_up(
+    rig: &Rig,
+    table: &TableValues,
+    scenario: &Scenario,
+    horizon: &Horizon,
+) -> Result<Outcome, HarnessError> {
+    with_firmware(table, |target| {
+        let mut harness = Harness::new(rig, table, scenario, target)?;
+        match harness.raise(Some(scenario.target_m(0.0) as f32)) {
+            Ok(output) => let_go(rig, &mut harness, output, scenario, horizon),
+            Err(HarnessError::NotBalancing(_)) => {
+                let kind = harness.session.fault().map_or(FallKind::NotArmed, FallKind::MotorOff);
+                Ok(Outcome::NOTHING_SEEN.ended(Some(Fall { at_s: 0.0, kind })))
+            }
+            Err(error) => Err(error),
+        }
+    })?
+}
+
+/// Runs `scenario` with a firmware that balances; `output` is its first.
+fn let_go(
+    rig: &Rig,
+    harness: &mut Harness<'_>,
+    mut output: Output,
+    scenario: &Scenario,
+    horizon: &Horizon,
+) -> Result<Outcome, HarnessError> {
+    let in_ticks = |seconds: f64| (seconds / rig.tick.period_s).max(1.0) as usize;
+    let keep_alive_ticks = in_ticks(KEEP_ALIVE.as_secs_f64());
+    let command_ticks = harness.session.pace().command_ticks;
+    let mut outcome = Outcome::NOTHING_SEEN;
+    let mut commanded = scenario.target_m(0.0);
+    harness.session.send(Request::Telemetry(in_ticks(TELEMETRY_S) as u16));
+    for tick in 0..=ticks(rig, scenario)? {
+        let t = tick as f64 * rig.tick.period_s;
+        let target = scenario.target_m(t);
+        let state = harness.bench.state().to_vec();
+        let force = harness.bench.tick(output.drive);
+        outcome.see(
+            rig,
+            horizon,
+            &Sample { t, target, setpoint: target, requested: force, force, state: &state, estimate: &[] },
+        );
+        let off = harness.session.fault().map(|fault| Fall { at_s: t, kind: FallKind::MotorOff(fault) });
+        if let Some(fall) = off.or_else(|| Fall::of(rig, t, &without_turns(&state))) {
+            return Ok(outcome.ended(Some(fall)));
+        }
+        let ahead = scenario.target_m((tick + command_ticks) as f64 * rig.tick.period_s);
+        if ahead != commanded {
+            harness.session.send(Request::Setpoint(ahead as f32));
+            commanded = ahead;
+        } else if tick.is_multiple_of(keep_alive_ticks) {
+            harness.session.send(Request::KeepAlive);
+        }
+        let inputs = harness.inputs();
+        output = harness.session.tick(&inputs)?;
+        harness.session.forget_received();
+    }
+    Ok(outcome)
 }
 
 /// [`trial`] for each of these cases, several in lockstep.

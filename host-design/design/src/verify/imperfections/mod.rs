@@ -11,7 +11,6 @@ use upright::table::Law;
 use super::error::{VerifyError, chain, within};
 use crate::parallel;
 use crate::rig::{Reality, Rig};
-use crate::simulate::SimulationError;
 use crate::table::TableValues;
 
 pub use catalogue::{IMPERFECTIONS, Imperfection};
@@ -65,7 +64,7 @@ pub fn survival(
     imperfection: &'static Imperfection,
 ) -> Result<Survival, VerifyError> {
     chain(rig, "imperfections")?;
-    Ok(SizeSearch { rig, table, law, settings }.survival(imperfection, &[])?)
+    SizeSearch { rig, table, law, settings }.survival(imperfection, &[])
 }
 
 /// Runs `law` with one imperfection alone, of this size.
@@ -81,7 +80,7 @@ pub fn of_size(
     size: f64,
 ) -> Result<SizeRuns, VerifyError> {
     chain(rig, "imperfections")?;
-    Ok(SizeSearch { rig, table, law, settings }.alone(imperfection, size)?)
+    SizeSearch { rig, table, law, settings }.alone(imperfection, size)
 }
 
 /// Runs `law` with the imperfections that it has to survive according to `[verify]`; empty if there are none.
@@ -104,7 +103,7 @@ pub fn required_imperfections(
         let survival = |verdict| RequiredSurvival { key, requirement, size, runs: settings.seeds, verdict };
         Some(search.alone(imperfection, size).map(survival))
     };
-    Ok(IMPERFECTIONS.iter().filter_map(required).collect::<Result<_, SimulationError>>()?)
+    IMPERFECTIONS.iter().filter_map(required).collect::<Result<_, VerifyError>>()
 }
 
 /// The limit cycle as a function of the size of an imperfection: sizes below the one at which the loop falls, or below
@@ -126,5 +125,5 @@ pub fn limit_cycle(
         let size = share * end;
         search.alone(survival.imperfection, size).map(|verdict| (size, verdict))
     };
-    Ok(SHARES.into_iter().map(at).collect::<Result<_, SimulationError>>()?)
+    SHARES.into_iter().map(at).collect::<Result<_, VerifyError>>()
 }

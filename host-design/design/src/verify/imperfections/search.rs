@@ -8,9 +8,12 @@ use super::catalogue::Imperfection;
 use super::survival::{Cure, ImperfectionSettings, OfBristle, SizeRuns, Survival};
 use crate::parallel;
 use crate::rig::Rig;
-use crate::simulate::{FallKind, Scenario, SimulationError};
+use crate::simulate::{FallKind, Scenario, Sensing};
 use crate::table::TableValues;
-use crate::verify::trial::{Horizon, Outcome, disturbed, leaning, moving, trial, waking_lean};
+use crate::verify::error::VerifyError;
+use crate::verify::trial::{
+    Horizon, Outcome, disturbed, leaning, moving, trial, trial_from_power_up, waking_lean,
+};
 
 /// Sizes are tried from this share of a good machine's to this multiple of a poor one's.
 const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
@@ -41,7 +44,7 @@ impl SizeSearch<'_> {
         &self,
         imperfection: &'static Imperfection,
         changed: &[(String, TableValues)],
-    ) -> Result<Survival, SimulationError> {
+    ) -> Result<Survival, VerifyError> {
         let [_, largest_tried] = self.range(imperfection);
         let of_bristles = imperfection.bristles_rad().into_iter().map(|bristle_rad| {
             let first = |judge| {
@@ -56,7 +59,7 @@ impl SizeSearch<'_> {
                 first(Judge::FirmwareMoving)?,
             ))
         });
-        let of_bristles = of_bristles.collect::<Result<Vec<_>, SimulationError>>()?;
+        let of_bristles = of_bristles.collect::<Result<Vec<_>, VerifyError>>()?;
         let least = |sizes: &mut dyn Iterator<Item = Option<(f64, FallKind)>>| {
             sizes.flatten().min_by(|(a, _), (b, _)| a.total_cmp(b))
         };
@@ -92,7 +95,7 @@ impl SizeSearch<'_> {
         imperfection: &'static Imperfection,
         size: f64,
         changed: &[(String, TableValues)],
-    ) -> Result<Option<Cure>, SimulationError> {
+    ) -> Result<Option<Cure>, VerifyError> {
         let mut best: Option<Cure> = None;
         for (change, table) in changed {
             let search = SizeSearch { table, ..*self };
@@ -128,20 +131,20 @@ impl SizeSearch<'_> {
     fn first(
         &self,
         imperfection: &Imperfection,
-        end: &dyn Fn(f64) -> Result<Option<FallKind>, SimulationError>,
-    ) -> Result<Option<(f64, FallKind)>, SimulationError> {
+        end: &dyn Fn(f64) -> Result<Option<FallKind>, VerifyError>,
+    ) -> Result<Option<(f64, FallKind)>, VerifyError> {
         let (start, relative) = (imperfection.typical[1], self.settings.relative);
         let mut ends = BTreeMap::new();
         let found = first(self.range(imperfection), start, relative, |size| {
             let end = end(size)?;
             ends.insert(size.to_bits(), end);
-            Ok::<_, SimulationError>(end.is_none())
+            Ok::<_, VerifyError>(end.is_none())
         })?;
         Ok(found.and_then(|size| Some((size, (*ends.get(&size.to_bits())?)?))))
     }
 
     /// How the first of the runs on these machines ends that does not survive.
-    fn end(&self, machines: &[Rig], judge: Judge) -> Result<Option<FallKind>, SimulationError> {
+    fn end(&self, machines: &[Rig], judge: Judge) -> Result<Option<FallKind>, VerifyError> {
         for real in machines {
             for seed in 1..=self.settings.seeds {
                 if let Some(fall) = self.run(real, seed, judge)?.fall {
@@ -152,7 +155,7 @@ impl SizeSearch<'_> {
         Ok(None)
     }
 
-    fn run(&self, real: &Rig, seed: u64, judge: Judge) -> Result<Outcome, SimulationError> {
+    fn run(&self, real: &Rig, seed: u64, judge: Judge) -> Result<Outcome, VerifyError> {
         let ImperfectionSettings { duration_s, disturbance, .. } = self.settings;
         let scenario = Scenario {
             is_supervised: judge != Judge::Controller,
@@ -160,12 +163,17 @@ impl SizeSearch<'_> {
             ..disturbed(real, self.law, *duration_s, disturbance, seed)
         };
         let scenario = if judge == Judge::FirmwareMoving { moving(scenario, self.table) } else { scenario };
-        trial(real, self.table, &scenario, &Horizon::default())
+        let horizon = Horizon::default();
+        // A firmware without encoders cannot be started.
+        if judge == Judge::Controller || scenario.sensing != Sensing::Encoders {
+            return Ok(trial(real, self.table, &scenario, &horizon)?);
+        }
+        Ok(trial_from_power_up(real, self.table, &scenario, &horizon)?)
     }
 
     /// Runs of all seeds on a machine with this imperfection alone; of the machines of
     /// [`on_each`](Imperfection::on_each), the one on which the fewest survive.
-    pub(super) fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<SizeRuns, SimulationError> {
+    pub(super) fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<SizeRuns, VerifyError> {
         let machines = imperfection.on_each(self.rig, size);
         let all = machines.iter().map(|real| self.verdict(real)).collect::<Result<Vec<_>, _>>()?;
         let worst = all.into_iter().min_by_key(|runs| (runs.stayed_on, runs.survived));
@@ -174,14 +182,14 @@ impl SizeSearch<'_> {
 
     /// Runs of all seeds on this machine, by the whole firmware and, where it turns the motor off, by the controller
     /// alone.
-    pub(super) fn verdict(&self, real: &Rig) -> Result<SizeRuns, SimulationError> {
+    pub(super) fn verdict(&self, real: &Rig) -> Result<SizeRuns, VerifyError> {
         let one = |seed: u64| {
             let by_firmware = self.run(real, seed, Judge::Firmware)?;
             let alone = match by_firmware.fall {
                 Some(_) => self.run(real, seed, Judge::Controller)?,
                 None => by_firmware.clone(),
             };
-            Ok::<_, SimulationError>((by_firmware, alone))
+            Ok::<_, VerifyError>((by_firmware, alone))
         };
         let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
         let ended: Vec<FallKind> =
