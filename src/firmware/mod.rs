@@ -287,8 +287,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
         let counts = *self.controller.encoders().counts();
-        let still = self.table.absolute.as_ref().map_or(&[1; NY], |absolute| &absolute.still_counts);
-        self.calibration.update(&counts, still, &self.table.limits);
+        self.calibration.update(&counts, &self.table.absolute.still_counts, &self.table.limits);
         counts
     }
 
@@ -413,8 +412,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// `position`, where the links hang, with the positions of absolute sensors by their own zeros.
+    #[cold]
+    #[inline(never)]
     fn by_zeros(&self, position: [i32; NY]) -> Result<[i32; NY], Inhibits> {
-        let Some(absolute) = &self.table.absolute else { return Ok(position) };
+        let absolute = &self.table.absolute;
+        if !absolute.is_any() {
+            return Ok(position);
+        }
         absolute.positions(&position, &self.raw_counts, &self.table.limits).ok_or(Inhibits::OTHER_ZERO)
     }
 

@@ -16,6 +16,16 @@ part! {
 }
 
 impl<const NY: usize> AbsoluteZeros<NY> {
+    /// Sensors that only count.
+    pub const fn none() -> Self {
+        Self { zero_counts: [-1; NY], still_counts: [1; NY] }
+    }
+
+    /// Whether any sensor is an absolute one.
+    pub fn is_any(&self) -> bool {
+        self.zero_counts.iter().any(|&zero| zero >= 0)
+    }
+
     /// Whether every zero is within a turn.
     pub(crate) fn is_sound(&self, limits: &Limits<NY>) -> bool {
         let mut zeros = self.zero_counts.iter().zip(&limits.turn_counts);
@@ -67,8 +77,11 @@ mod tests {
         assert_eq!(home(3940 + 3 * 4096), Some([0, 1988, 0]));
         // More than half of 130 counts is too far; a sensor that only counts takes where the links hang.
         assert_eq!((home(4070), home(3930), home(4000 + 2048)), (None, None, None));
-        let none = AbsoluteZeros { zero_counts: [-1; 3], ..ZEROS };
-        assert_eq!(none.positions(&[0, 2048, 0], &[77, 12, 99], &LIMITS), Some([0, 2048, 0]));
+        assert!(ZEROS.is_any() && !AbsoluteZeros::<3>::none().is_any());
+        assert_eq!(
+            AbsoluteZeros::none().positions(&[0, 2048, 0], &[77, 12, 99], &LIMITS),
+            Some([0, 2048, 0])
+        );
     }
 
     #[test]

@@ -53,8 +53,8 @@ part! {
         pub limits: Limits<NY>,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault.
         pub thresholds: Thresholds<NY>,
-        /// Absolute sensors, if there are any.
-        pub absolute: Option<AbsoluteZeros<NY>>,
+        /// Absolute sensors.
+        pub absolute: AbsoluteZeros<NY>,
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above, see [`GainTable::checksum`].
         pub crc,
@@ -110,7 +110,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && !(self.steps.is_some() && (self.motor.is_some() || self.pending_acts > 0.0))
             && self.limits.is_sound()
             && self.thresholds.is_sound()
-            && self.absolute.iter().all(|absolute| absolute.is_sound(&self.limits));
+            && self.absolute.is_sound(&self.limits);
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }

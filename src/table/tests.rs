@@ -83,7 +83,7 @@ fn full() -> GainTable<4, 2> {
         steps: None,
         limits: LIMITS,
         thresholds: THRESHOLDS,
-        absolute: Some(AbsoluteZeros { zero_counts: [-1, 17], still_counts: [1, 3] }),
+        absolute: AbsoluteZeros { zero_counts: [-1, 17], still_counts: [1, 3] },
         crc: 0,
     };
     table.crc = table.checksum();

@@ -9,7 +9,7 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{
-    FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
+    AbsoluteZeros, FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
 };
 
 /// Structure of Ad, which decides the code path of the prediction.
@@ -85,6 +85,7 @@ fn table<const NX: usize, const NY: usize>(
         steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
+        absolute: AbsoluteZeros::none(),
         crc: 0,
     };
     table.crc = table.checksum();

@@ -1,7 +1,9 @@
 //! Tests of whole ticks of the controller.
 
 use super::*;
-use crate::table::{Limits, ObserverGains, PerLaw, StepMap, TABLE_FORMAT, Thresholds, columns};
+use crate::table::{
+    AbsoluteZeros, Limits, ObserverGains, PerLaw, StepMap, TABLE_FORMAT, Thresholds, columns,
+};
 use nalgebra::{matrix, vector};
 
 /// A cart of 2 kg without friction, held for half a second.
@@ -31,7 +33,7 @@ fn table() -> GainTable<2, 1> {
         steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
-        absolute: None,
+        absolute: AbsoluteZeros::none(),
         crc: 0,
     };
     table.crc = table.checksum();

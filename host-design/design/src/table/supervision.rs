@@ -77,16 +77,16 @@ fn set_limits_of_chain(
     Ok(())
 }
 
-/// Zeros of the absolute sensors of `rig`, whose sensors have these steps; none if it has no such sensor.
-pub(super) fn absolute_zeros(rig: &Rig, steps: &[f64]) -> Option<AbsoluteZeros<MAX_SENSORS>> {
-    let mut zeros = AbsoluteZeros { zero_counts: [-1; MAX_SENSORS], still_counts: [1; MAX_SENSORS] };
+/// Zeros of the absolute sensors of `rig`, whose sensors have these steps.
+pub(super) fn absolute_zeros(rig: &Rig, steps: &[f64]) -> AbsoluteZeros<MAX_SENSORS> {
+    let mut zeros = AbsoluteZeros::none();
     for (sensor, (description, &step)) in rig.sensors().iter().zip(steps).enumerate() {
         if let Some([_, zero]) = description.absolute {
             zeros.zero_counts[sensor] = zero as i32;
             zeros.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
         }
     }
-    zeros.zero_counts.iter().any(|&zero| zero >= 0).then_some(zeros)
+    zeros
 }
 
 /// Thresholds of a design; without one, thresholds that nothing exceeds.

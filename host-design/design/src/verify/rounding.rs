@@ -5,7 +5,9 @@ use serde::Serialize;
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
-use upright::table::{FrictionMap, GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds};
+use upright::table::{
+    AbsoluteZeros, FrictionMap, GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds,
+};
 
 use super::loop_model::{LoopModel, Numbers, seen_plant};
 use super::{VerifyError, radius};
@@ -168,7 +170,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
-        absolute: None,
+        absolute: AbsoluteZeros::none(),
         crc: 0,
     }
 }

@@ -32,7 +32,7 @@ fn the_firmware_raises_and_balances_every_rig_with_absolute_sensors() {
     for (name, noise_rad) in ALL_RIGS.iter().zip([4e-4, 2e-4, 1e-4, 2e-5]) {
         let rig = absolute(name, noise_rad);
         let values = table(&rig);
-        assert_eq!(values.absolute.unwrap().zero_counts[..2], [-1, 3], "{name}");
+        assert_eq!(values.absolute.zero_counts[..2], [-1, 3], "{name}");
         let scenario = Scenario { duration_s: 3.0, ..Scenario::at_rest(&rig, Law::Lqr) };
         let run = with_firmware(&values, |firmware| record(&rig, &values, &scenario, firmware));
         let run = run.unwrap().unwrap();

@@ -104,7 +104,7 @@ fn check_board(
 
 /// Checks that the table's rig has encoders alone.
 pub(super) fn counts_all(table: &TableValues) -> Result<(), BuildError> {
-    let link = table.absolute.and_then(|absolute| absolute.zero_counts.iter().position(|&zero| zero >= 0));
+    let link = table.absolute.zero_counts.iter().take(table.sensors()).position(|&zero| zero >= 0);
     link.map_or(Ok(()), |link| Err(BuildError::AbsoluteSensor { link }))
 }
 
