@@ -10,8 +10,8 @@ const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Factor on the speed of a cart that never sticks: its friction shows it better than the length of a bristle.
 const CREEPING: f64 = 1.1;
 /// Factor on the excess of the friction at rest, if there is one, and the excess of the other contacts, which may have
-/// one that is hardly seen.
-const OTHER_EXCESS: (f64, f64) = (0.5, 0.15);
+/// a usual one that is hardly seen.
+const OTHER_EXCESS: (f64, f64) = (0.5, 0.4);
 /// Iterations of each refit.
 const ITERATIONS: usize = 2;
 /// Terms that are added in quadrature to a statistical deviation.
