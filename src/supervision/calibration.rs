@@ -48,7 +48,8 @@ impl<const NY: usize> Calibration<NY> {
         *self = Self::new(limits);
     }
 
-    /// Takes the counts of a tick with the motor off; `still` is the largest motion of each sensor that is still (counts).
+    /// Takes the counts of a tick with the motor off; `still` is the largest motion of each sensor that is still
+    /// (counts).
     pub fn update(&mut self, counts: &[i32; NY], still: &[i32; NY], limits: &Limits<NY>) {
         self.still.update(counts, still);
         self.slow.update(counts, &limits.slow_counts);

@@ -34,8 +34,8 @@ impl<const NY: usize> AbsoluteZeros<NY> {
     }
 
     /// `home`, the positions of the sensors where the links hang, with those of absolute sensors, which read `raw`, by
-    /// their own zeros; none if such a sensor is off by more than half of [`Limits::sign_counts`], so that its link does
-    /// not hang or its zero is another one.
+    /// their own zeros; none if such a sensor is off by more than half of [`Limits::sign_counts`], so that its link
+    /// does not hang or its zero is another one.
     pub fn positions(&self, home: &[i32; NY], raw: &[u32; NY], limits: &Limits<NY>) -> Option<[i32; NY]> {
         let mut away = [0; NY];
         let sensors = away.iter_mut().zip(raw).zip(&self.zero_counts).zip(&limits.rest_counts).zip(home);
