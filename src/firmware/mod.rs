@@ -412,8 +412,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// `position`, where the links hang, with the positions of absolute sensors by their own zeros.
-    #[cold]
-    #[inline(never)]
     fn by_zeros(&self, position: [i32; NY]) -> Result<[i32; NY], Inhibits> {
         let absolute = &self.table.absolute;
         if !absolute.is_any() {
