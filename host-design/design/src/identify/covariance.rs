@@ -9,9 +9,11 @@ use super::record::Record;
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Factor on the speed of a cart that never sticks: its friction shows it better than the length of a bristle.
 const CREEPING: f64 = 1.1;
-/// Factor on the excess of the friction at rest, if there is one, and the excess of the other contacts, which may have
-/// a usual one that is hardly seen.
-const OTHER_EXCESS: (f64, f64) = (0.5, 0.4);
+/// Factors on the excess of the friction at rest of the cart and of the joints, where there is one, for each refit: that
+/// of the joints is often found too small.
+const OTHER_EXCESSES: [[f64; 2]; 2] = [[0.5, 0.5], [0.5, 2.0]];
+/// The excess of the other contacts, if one has some: a usual one that is hardly seen.
+const UNSEEN_EXCESS: f64 = 0.4;
 /// Iterations of each refit.
 const ITERATIONS: usize = 2;
 /// Terms that are added in quadrature to a statistical deviation.
@@ -65,10 +67,12 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
         let other = Filter { model: &model, ..*filter };
         widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
     }
-    if filter.model.excess != [0.0; 2] {
+    let others = if filter.model.excess == [0.0; 2] { &[][..] } else { &OTHER_EXCESSES };
+    for factors in others {
         let mut model = filter.model.clone();
-        let other = |excess: f64| if excess > 0.0 { OTHER_EXCESS.0 * excess } else { OTHER_EXCESS.1 };
-        model.excess = model.excess.map(other);
+        for (excess, factor) in model.excess.iter_mut().zip(factors) {
+            *excess = if *excess > 0.0 { factor * *excess } else { UNSEEN_EXCESS };
+        }
         let other = Filter { model: &model, ..*filter };
         widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
     }
