@@ -83,10 +83,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// Homes at the present position: the cart is at 0, and the links hang still or swing about hanging.
     fn home_here(&mut self) -> Result<(), Inhibits> {
         let position = self.calibration.hanging(self.controller.encoders().counts(), &self.table.limits)?;
-        let position = self.by_zeros(position)?;
-        self.supervisor.complete_homing()?;
-        self.home(&position);
-        Ok(())
+        self.home(&position)
     }
 
     /// Starts homing by the limit switches.

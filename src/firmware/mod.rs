@@ -398,11 +398,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn home_by_switches(&mut self, counts: &[i32; NY]) {
         let found = self.calibration.update_rail_homing(counts, &self.contacts, &self.table.limits);
         match found.and_then(|position| Ok((position, self.drive_to_switches(counts)?))) {
-            Ok((Some(position), true)) => {
-                if let Ok(position) = self.by_zeros(position) {
-                    self.home(&position);
-                }
-            }
+            // Tried again in the next tick, until the links hang where their sensors' zeros say.
+            Ok((Some(position), true)) => _ = self.home(&position),
             Ok(_) => {}
             Err(WrongTravel) => {
                 self.supervisor.disarm();
@@ -411,21 +408,16 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// `position`, where the links hang, with the positions of absolute sensors by their own zeros.
-    fn by_zeros(&self, position: [i32; NY]) -> Result<[i32; NY], Inhibits> {
-        let absolute = &self.table.absolute;
-        if !absolute.is_any() {
-            return Ok(position);
-        }
-        absolute.positions(&position, &self.raw_counts, &self.table.limits).ok_or(Inhibits::OTHER_ZERO)
-    }
-
-    fn home(&mut self, position: &[i32; NY]) {
-        if self.supervisor.complete_homing().is_ok() {
-            self.controller.encoders_mut().home(&self.raw_counts, position);
-            self.calibration.set_homed();
-            self.slow_drive.want(0.0);
-        }
+    /// Homes with the sensors at `position`, or, if they are absolute, where their own zeros say.
+    fn home(&mut self, position: &[i32; NY]) -> Result<(), Inhibits> {
+        let table = self.table;
+        let position = table.absolute.positions(position, &self.raw_counts, &table.limits);
+        let position = position.ok_or(Inhibits::OTHER_ZERO)?;
+        self.supervisor.complete_homing()?;
+        self.controller.encoders_mut().home(&self.raw_counts, &position);
+        self.calibration.set_homed();
+        self.slow_drive.want(0.0);
+        Ok(())
     }
 }
 

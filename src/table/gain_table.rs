@@ -109,8 +109,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && self.steps.iter().all(StepMap::is_sound)
             && !(self.steps.is_some() && (self.motor.is_some() || self.pending_acts > 0.0))
             && self.limits.is_sound()
-            && self.thresholds.is_sound()
-            && self.absolute.is_sound(&self.limits);
+            && self.thresholds.is_sound();
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }

@@ -9,8 +9,8 @@ use super::record::Record;
 const SMOOTHINGS: [f64; 2] = [0.4, 2.5];
 /// Factor on the speed of a cart that never sticks: its friction shows it better than the length of a bristle.
 const CREEPING: f64 = 1.1;
-/// Factors on the excess of the friction at rest of the cart and of the joints, where there is one, for each refit: that
-/// of the joints is often found too small.
+/// Factors on the excess of the friction at rest of the cart and of the joints, where there is one, for each refit:
+/// that of the joints is often found too small.
 const OTHER_EXCESSES: [[f64; 2]; 2] = [[0.5, 0.5], [0.5, 2.0]];
 /// The excess of the other contacts, if one has some: a usual one that is hardly seen.
 const UNSEEN_EXCESS: f64 = 0.4;
