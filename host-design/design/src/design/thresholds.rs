@@ -73,9 +73,9 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
         .collect();
     let by_hand = pushed(rig, design, kalman, innovation[0]).unwrap_or_default();
     let push = by_hand.iter().zip(&innovation).map(|(by_hand, healthy)| healthy + by_hand).collect();
-    let rounding = sensor_variances(rig, steps);
+    let measurement = sensor_variances(rig, steps);
     let sensor = rig.actuator.input().motor_sensor();
-    let frozen = (variances.iter().zip(steps).zip(rounding).zip(&tolerated.corrected)).map(
+    let frozen = (variances.iter().zip(steps).zip(measurement).zip(&tolerated.corrected)).map(
         |(((s, step), r), bound)| {
             let corrected = (s - r).max(0.0) / (1.0 - keep * keep);
             step + wider * (g * corrected.sqrt() + bound)

@@ -27,6 +27,7 @@
 
 mod error;
 mod held_rig;
+mod host;
 mod in_process;
 mod operator;
 mod rail_ends;
@@ -37,6 +38,7 @@ mod target;
 
 pub use error::HarnessError;
 pub use held_rig::HeldRig;
+pub(crate) use host::Host;
 pub use in_process::{endless_firmware, with_firmware, with_table};
 pub use operator::{Operator, OperatorTick, Status};
 pub use rail_ends::RailEnds;

@@ -3,13 +3,12 @@
 use std::collections::VecDeque;
 
 use upright::board::Output;
-use upright::protocol::KEEP_ALIVE;
-use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::error::HarnessError;
+use super::host::Host;
 use super::session::Session;
 use super::start_up::Harness;
 use super::target::{Pace, Target};
@@ -64,24 +63,20 @@ pub fn record(
     let mut harness = Harness::new(rig, table, scenario, target)?;
     let target_at = |tick: usize| scenario.target_m(tick as f64 * period_s);
     let mut output = harness.raise(Some(target_at(0) as f32))?;
-    let mut commanded = target_at(0);
     let last = ticks(rig, scenario)?;
     let mut record = RunRecord::new(rig, last, pace.telemetry_ticks.into());
     let goals = goals(scenario, period_s);
-    let keep_alive = (KEEP_ALIVE.as_secs_f64() / period_s).max(1.0) as usize;
+    let mut host = Host::new(scenario, period_s, pace.command_ticks);
     for tick in 0..=last {
         if tick > 0 {
             let inputs = harness.inputs();
             output = harness.session.tick(&inputs)?;
         }
-        let ahead = target_at(tick + pace.command_ticks);
-        if harness.ask_for(tick, &goals) {
-            // At most one command per tick.
-        } else if commanded != ahead {
-            harness.session.send(Request::Setpoint(ahead as f32));
-            commanded = ahead;
-        } else if tick.is_multiple_of(keep_alive) {
-            harness.session.send(Request::KeepAlive);
+        // At most one command per tick.
+        if !harness.ask_for(tick, &goals)
+            && let Some(request) = host.request(tick)
+        {
+            harness.session.send(request);
         }
         let t = tick as f64 * period_s;
         // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.

@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 use upright::board::Output;
-use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::table::Law;
 
-use crate::harness::{Harness, HarnessError, with_firmware};
+use crate::harness::{Harness, HarnessError, Host, with_firmware};
 use crate::plant::{absolute_angles, without_turns};
 use crate::rig::{CartInput, Rig};
 use crate::simulate::{Fall, FallKind, Job, Sample, Scenario, SimulationError, run, run_all, ticks};
@@ -193,12 +192,9 @@ fn let_go(
     scenario: &Scenario,
     horizon: &Horizon,
 ) -> Result<Outcome, HarnessError> {
-    let in_ticks = |seconds: f64| (seconds / rig.tick.period_s).max(1.0) as usize;
-    let keep_alive_ticks = in_ticks(KEEP_ALIVE.as_secs_f64());
-    let command_ticks = harness.session.pace().command_ticks;
+    let mut host = Host::new(scenario, rig.tick.period_s, harness.session.pace().command_ticks);
     let mut outcome = Outcome::NOTHING_SEEN;
-    let mut commanded = scenario.target_m(0.0);
-    harness.session.send(Request::Telemetry(in_ticks(TELEMETRY_S) as u16));
+    harness.session.send(Request::Telemetry((TELEMETRY_S / rig.tick.period_s).max(1.0) as u16));
     for tick in 0..=ticks(rig, scenario)? {
         let t = tick as f64 * rig.tick.period_s;
         let target = scenario.target_m(t);
@@ -213,12 +209,8 @@ fn let_go(
         if let Some(fall) = off.or_else(|| Fall::of(rig, t, &without_turns(&state))) {
             return Ok(outcome.ended(Some(fall)));
         }
-        let ahead = scenario.target_m((tick + command_ticks) as f64 * rig.tick.period_s);
-        if ahead != commanded {
-            harness.session.send(Request::Setpoint(ahead as f32));
-            commanded = ahead;
-        } else if tick.is_multiple_of(keep_alive_ticks) {
-            harness.session.send(Request::KeepAlive);
+        if let Some(request) = host.request(tick) {
+            harness.session.send(request);
         }
         let inputs = harness.inputs();
         output = harness.session.tick(&inputs)?;
