@@ -40,13 +40,11 @@ pub(super) fn force_last<R: Real>(k: &Matrix<R>) -> Matrix<R> {
     Matrix::from_fn(k.rows(), k.cols(), |row, column| k[(row, from(column))].clone())
 }
 
-/// The shares of the pending force, [in the mean force of a tick, left for the next tick], see
-/// [`GainTable`](upright::table::GainTable).
-pub(crate) fn shares(rig: &Rig) -> [f64; 2] {
-    match (lag_s(rig), rig.tick.period_s) {
-        (0.0, _) => [f64::from(rig.tick.delay_ticks), 0.0],
-        (lag_s, period_s) => {
-            [-libm::expm1(-period_s / lag_s) * lag_s / period_s, libm::exp(-period_s / lag_s)]
-        }
+/// The shares of the pending force, [in the mean force of a tick, left for the next tick], with ticks of `period_s`,
+/// see [`GainTable`](upright::table::GainTable).
+pub(crate) fn shares(rig: &Rig, period_s: f64) -> [f64; 2] {
+    match lag_s(rig) {
+        0.0 => [f64::from(rig.tick.delay_ticks), 0.0],
+        lag_s => [-libm::expm1(-period_s / lag_s) * lag_s / period_s, libm::exp(-period_s / lag_s)],
     }
 }

@@ -213,7 +213,7 @@ impl Limits {
 impl PushedLoop<'_> {
     /// Whether no limit is exceeded when the rig is pushed from rest with this force for `lasts` ticks.
     fn survives(&self, law: &Feedback<f64>, push: &UnitPush, lasts: usize, force_n: f64) -> bool {
-        let [acts, stays] = shares(self.rig);
+        let [acts, stays] = shares(self.rig, self.rig.tick.period_s);
         let mut state = vec![0.0; push.held.len()];
         let (mut estimate, mut next) = (state.clone(), state.clone());
         let mut pending = 0.0;

@@ -15,6 +15,7 @@ use super::log::{DriveScale, Log};
 use super::model::Model;
 use super::parameters::Layout;
 use super::table::RecordingRows;
+use crate::design::shares;
 use crate::rig::{Motor, Rig};
 
 /// Longest time from one sample to the next (s), which is also the integration step.
@@ -44,7 +45,8 @@ pub(super) struct Record {
     /// Travel per count of each channel (m, rad).
     pub(super) steps: Vec<f64>,
     motor: Option<Motor>,
-    delay_ticks: usize,
+    /// How the force follows its command: see [`shares`].
+    shares: [f64; 2],
     /// Whether the cart cannot move; its channel is then 0.
     pub(super) is_clamped: bool,
     /// Whether the drive imposes the cart's motion: its channel is the input.
@@ -71,7 +73,7 @@ impl Record {
             stride,
             dt_s: stride as f64 * period_s,
             motor: rig.actuator.motor.clone(),
-            delay_ticks: usize::from(rig.tick.delay_ticks),
+            shares: shares(rig, period_s),
             is_clamped: false,
             is_moved: rig.actuator.acceleration.is_some(),
             steps,
@@ -213,13 +215,23 @@ impl Record {
         }
         let (delay, dead_zone) = (p[layout.delay()], p[layout.dead_zone()]);
         let drive = &self.pieces[piece].drive;
-        let force = |tick: Option<usize>| {
-            let value = tick.and_then(|tick| drive[tick]).unwrap_or_default();
+        let commanded = |value: f64| {
             let Some(motor) = &self.motor else { return [value, 0.0] };
             let per_volt = motor.newtons_per_volt();
             let left = value.abs() - dead_zone;
             if left > 0.0 { [per_volt * left.copysign(value), -per_volt.copysign(value)] } else { [0.0; 2] }
         };
+        let [pending, left] = self.shares;
+        let mut before = [0.0; 2];
+        let mean = |drive: &Option<f64>| {
+            let command = commanded(drive.unwrap_or_default());
+            let mix = |share: f64| [0, 1].map(|i| share * before[i] + (1.0 - share) * command[i]);
+            let mean = mix(pending);
+            before = mix(left);
+            mean
+        };
+        // Force in each tick, and its derivative by the dead zone.
+        let forces: Vec<[f64; 2]> = drive.iter().map(mean).collect();
         let back_emf = self.back_emf();
         let mut inputs = Vec::with_capacity(self.samples(piece));
         for first in (0..drive.len()).step_by(self.stride) {
@@ -227,9 +239,8 @@ impl Record {
             let share = 1.0 / ticks.len() as f64;
             let mut input = CartForce::default();
             for tick in ticks {
-                let now = tick.checked_sub(self.delay_ticks);
-                let ([new, new_by], [old, old_by]) =
-                    (force(now), force(now.and_then(|tick| tick.checked_sub(1))));
+                let [new, new_by] = forces[tick];
+                let [old, old_by] = tick.checked_sub(1).map_or([0.0; 2], |before| forces[before]);
                 if drive[tick].is_some() {
                     input.back_emf += share * back_emf;
                 }

@@ -95,7 +95,7 @@ impl TableValues {
         let steps = double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, double);
         let friction = friction::friction_map(rig, double)?;
-        let [pending_acts, pending_stays] = shares(rig);
+        let [pending_acts, pending_stays] = shares(rig, rig.tick.period_s);
         let widest = GainTable {
             format: TABLE_FORMAT,
             states: states as u32,

@@ -142,7 +142,7 @@ impl<R: Real> Numbers<R> {
             measured,
             output: rig.output(),
             tick_s: R::from_f64(rig.tick.period_s),
-            pending: shares(rig).map(R::from_f64),
+            pending: shares(rig, rig.tick.period_s).map(R::from_f64),
         })
     }
 

@@ -97,6 +97,35 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     assert!((total - of_total(&found.estimates)).abs() < 1e-9);
 }
 
+#[test]
+fn a_force_that_follows_late_is_known_if_the_file_states_its_lag() {
+    let with = |lag_s: f64, reality: &str| {
+        let rig = rig(reality);
+        Rig {
+            actuator: upright_design::rig::Actuator { driver_lag_s: Some(lag_s), ..rig.actuator.clone() },
+            ..rig
+        }
+    };
+    let (truth, file) = (with(4e-3, REALITY), with(4e-3, ""));
+    let log = shake(&truth, 15.0, 3).unwrap();
+    let found = run(&file, &log, &TRUSTED).unwrap();
+    assert_eq!(found.refusal, None, "{found:?}");
+    let of = |found: &Identification, kind| {
+        let estimate = found.estimate(kind).unwrap();
+        (estimate.new, estimate.deviation)
+    };
+    let constants =
+        ChainParameters::<f64>::of(&real_chain(truth.chain().unwrap(), &truth.reality.parameters));
+    let (mass_kg, deviation_kg) = of(&found, ParameterKind::TotalMass);
+    assert!((mass_kg - constants.total_mass).abs() < 4.0 * deviation_kg, "{mass_kg}");
+    // The latency of 0.4 ms in ticks, and nothing of the lag.
+    let (delay, deviation) = of(&found, ParameterKind::Delay);
+    assert!((delay - 0.4).abs() < 4.0 * deviation && deviation < 0.1, "{delay} ± {deviation}");
+    // Negative control: without the lag in the file, it is found as a delay.
+    let unstated = run(&rig(""), &log, &TRUSTED).unwrap();
+    assert!(of(&unstated, ParameterKind::Delay).0 > 1.5, "{unstated:?}");
+}
+
 fn of_total(estimates: &[upright_design::identify::Estimate]) -> f64 {
     estimates.iter().find(|estimate| estimate.kind == ParameterKind::TotalMass).unwrap().new
 }
