@@ -73,6 +73,17 @@ fn a_machine_on_a_stepper_is_commissioned_and_its_defects_stop_it() {
 }
 
 #[test]
+fn a_machine_with_absolute_sensors_passes_unless_the_zero_of_one_is_another() {
+    const NAME: &str = "double-absolute";
+    let (_, table) = rig_and_table(NAME);
+    assert_eq!(stopped(NAME, table, None, &CommissionStep::EARLY), None);
+    let mut other = table.clone();
+    other.absolute.zero_counts[2] += 400;
+    let (step, words) = stopped(NAME, &other, None, &CommissionStep::EARLY).expect("it is found");
+    assert!(step == CommissionStep::Homing && words.contains("sensor_zero_counts"), "{step:?}: {words}");
+}
+
+#[test]
 fn every_planted_defect_is_found_in_its_step() {
     for (name, links) in [(SINGLE, 1), (DOUBLE, 2)] {
         let (_, table) = rig_and_table(name);
