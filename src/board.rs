@@ -121,8 +121,16 @@ pub trait Board<const NY: usize> {
     /// the motor stays off.
     fn tick_s(&self) -> f32;
 
-    /// Reads all inputs without waiting.
+    /// Reads all inputs. Waits for nothing but the bus of sensors, for a time that does not depend on them.
     fn inputs(&mut self) -> Inputs<NY>;
+
+    /// The sensors whose samples in the last [`inputs`](Self::inputs) are known to be bad, by parity, an error flag or
+    /// the end of a range: bit i for sensor i. What the observer predicts takes the place of a bad sample; the third in
+    /// a row of a sensor is [`Fault::Encoder`](crate::supervision::fault::Fault::Encoder). None, if the board cannot
+    /// tell: then a tick does not pay for it.
+    fn bad_samples(&self) -> Option<u32> {
+        None
+    }
 
     /// Drives the motor with the duty of `output` until the next call, or gives its pulses, once. A drive with pulses
     /// that is enabled without pulses holds the cart.

@@ -11,6 +11,7 @@ use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
 use upright::protocol::message::{Command, Message, Reset};
 use upright::protocol::serial_link::SerialLink;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::table::{GainTable, SwingUp};
 
 use super::error::HarnessError;
@@ -145,6 +146,12 @@ impl<const NY: usize> Board<NY> for Wires<NY> {
 
     fn inputs(&mut self) -> Inputs<NY> {
         self.inputs
+    }
+
+    fn bad_samples(&self) -> Option<u32> {
+        let of_sensor = |(sensor, &reading): (usize, &u32)| u32::from(reading & BAD_SAMPLE != 0) << sensor;
+        // The cart's counter has 32 bits.
+        Some(self.inputs.raw_counts.iter().enumerate().skip(1).map(of_sensor).sum())
     }
 
     fn tick_s(&self) -> f32 {
