@@ -8,7 +8,7 @@
 //! row is the fault *encoder*. The check finds every single wrong bit and a wire at 3.3 V, but not a wire at 0 V: that
 //! is a valid frame, of angle 0.
 
-use upright::board::{Board, Contacts, Inputs, Output};
+use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::{AbsoluteSensor, CounterWidth, Encoders};
 
 /// The sensor has found an error in a command.
@@ -33,7 +33,7 @@ struct Machine {
     /// The sensor with its last good angle.
     link: AbsoluteSensor,
     count: u32,
-    is_bad: bool,
+    bad: BadSamples,
 }
 
 impl Board<2> for Machine {
@@ -45,16 +45,16 @@ impl Board<2> for Machine {
 
     fn inputs(&mut self) -> Inputs<2> {
         let angle = angle(self.frame);
-        self.is_bad = angle.is_none();
+        // Sensor 0 is the cart's.
+        self.bad.now = u32::from(angle.is_none()) << 1;
         if let Some(angle) = angle {
             self.count = self.link.count(angle.into());
         }
         Inputs { raw_counts: [self.cart, self.count], supply_v: 24.0, contacts: Contacts::default() }
     }
 
-    fn bad_samples(&self) -> Option<u32> {
-        // Sensor 0 is the cart's.
-        Some(u32::from(self.is_bad) << 1)
+    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+        Some(&mut self.bad)
     }
 
     // A machine to look at: it has no motor, watchdog or clock.
@@ -69,7 +69,7 @@ impl Board<2> for Machine {
 
 fn main() {
     let link = AbsoluteSensor::new(14);
-    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link, count: 0, is_bad: false };
+    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link, count: 0, bad: BadSamples::default() };
     // As the firmware does it: homed once, and then read every tick.
     let mut encoders = Encoders::new(Machine::WIDTHS);
     encoders.home(&machine.inputs().raw_counts, &[0, 0]);
@@ -89,8 +89,8 @@ fn main() {
     for (frame, bad) in [(0xffff, 0b10), (machine.frame, 0)] {
         machine.frame = frame;
         encoders.update(&machine.inputs().raw_counts);
-        println!("{frame:#06x}: bad samples {:#b}", machine.bad_samples().unwrap_or_default());
-        assert_eq!((machine.bad_samples(), encoders.counts()), (Some(bad), &[0, -4094]));
+        println!("{frame:#06x}: bad samples {:#b}", machine.bad.now);
+        assert_eq!((machine.bad.now, encoders.counts()), (bad, &[0, -4094]));
     }
     // At 0 V, the frame is that of angle 0.
     assert_eq!(angle(0), Some(0));

@@ -4,7 +4,6 @@ use heapless::spsc::{Consumer, Producer};
 
 use crate::board::{Board, Inputs, Output};
 use crate::firmware::Firmware;
-use crate::firmware::bad_samples::BadSamples;
 use crate::protocol::message::{Command, Message};
 use crate::protocol::queue;
 use crate::table::{NoSwingUp, SwingUp};
@@ -22,7 +21,6 @@ pub struct ControlTask<'q, 't, B, const NX: usize, const NY: usize, S = NoSwingU
     commands: Consumer<'q, Command>,
     messages: Producer<'q, Message<NX, NY>>,
     cycles: u32,
-    bad_samples: BadSamples,
 }
 
 impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
@@ -39,7 +37,7 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         messages: Producer<'q, Message<NX, NY>>,
     ) -> Self {
         firmware.compare_board(board.tick_s(), B::GIVES_PULSES, B::CHECKS_TABLES);
-        Self { firmware, board, commands, messages, cycles: 0, bad_samples: BadSamples::default() }
+        Self { firmware, board, commands, messages, cycles: 0 }
     }
 
     /// One tick.
@@ -56,10 +54,8 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
     ) {
         let begin = self.board.cycles();
         let mut inputs = self.board.inputs();
-        let lost = self
-            .board
-            .bad_samples()
-            .and_then(|bad| self.firmware.replace_bad_samples(&mut inputs, bad, &mut self.bad_samples));
+        let bad = self.board.bad_samples();
+        let lost = bad.and_then(|bad| self.firmware.replace_bad_samples(&mut inputs, bad));
         self.firmware.accept(&inputs);
         if let Some(sensor) = lost {
             self.firmware.lose_sensor(sensor);
