@@ -146,8 +146,8 @@ pub trait Board<const NY: usize> {
     /// Reads all inputs. Waits for nothing but the bus of sensors, for a time that does not depend on them.
     fn inputs(&mut self) -> Inputs<NY>;
 
-    /// The samples of the last [`inputs`](Self::inputs) that are known to be bad; none, if the board cannot tell: then a
-    /// tick does not pay for it.
+    /// The samples of the last [`inputs`](Self::inputs) that are known to be bad; none, if the board cannot tell:
+    /// then a tick does not pay for it.
     fn bad_samples(&mut self) -> Option<&mut BadSamples> {
         None
     }
