@@ -22,6 +22,7 @@
 //! The answer to a new request goes into `commands.rs`, a new condition on arming
 //! into `posture.rs`, a new field of telemetry into `telemetry.rs`.
 
+mod bad_samples;
 mod balancing;
 mod commands;
 pub mod control_task;

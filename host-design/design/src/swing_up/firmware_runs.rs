@@ -22,7 +22,7 @@ use crate::verify::wilson;
 
 /// How long a raised rig balances before it is lowered (s).
 const UPRIGHT_S: f64 = 1.0;
-/// Ticks between two telemetry messages of a run.
+/// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
 const TELEMETRY_TICKS: u16 = 20;
 
 /// The errors in a set of runs.
@@ -198,15 +198,19 @@ fn raised_and_lowered(
     let goals = goals(scenario, rig.tick.period_s);
     let Some(&(lower_at, _)) = goals.first() else { return Ok(Reached::default()) };
     let mut harness = Harness::new(rig, table, scenario, target)?;
-    let inputs = harness.inputs();
-    harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
     let mut reached = Reached::default();
     let mut output = match harness.raise(None) {
         Err(HarnessError::NotBalancing(_)) => {
-            return Ok(Reached { refused: Some(why_not_begun(&mut harness)?), ..reached });
+            // A fault in the first ticks of the motion is none of the reasons against a command.
+            reached.fault = harness.session.fault().map(|fault| fault.to_string());
+            if reached.fault.is_none() {
+                reached.refused = Some(why_not_begun(&mut harness)?);
+            }
+            return Ok(reached);
         }
         output => output?,
     };
+    harness.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = ticks(scenario.duration_s);
     let mut tick = 0;
     while tick <= last + harness.begun().first().map_or(0, |from| from - lower_at) {

@@ -29,7 +29,7 @@ const UPRIGHT_S: f64 = 0.5;
 const AFTER_S: f64 = 1.0;
 /// Longest time from the request until a lowering begins (s).
 const LONGEST_WAIT_S: f64 = 5.0;
-/// Ticks between two telemetry messages.
+/// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
 const TELEMETRY_TICKS: u16 = 20;
 
 /// Margins at one moment of a motion.
@@ -152,9 +152,8 @@ fn arrival(
 ) -> Result<Option<usize>, HarnessError> {
     let in_ticks = |seconds: f64| (seconds / rig.tick.period_s).round() as usize;
     let mut harness = Harness::new(rig, table, scenario, target)?;
-    let inputs = harness.inputs();
-    harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
     let mut output = harness.raise(None)?;
+    harness.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let (transition, goals) = match scenario.begin {
         Begin::Hanging => (Transition::Up, Vec::new()),
         Begin::ByHand => (Transition::Down, goals(scenario, rig.tick.period_s)),

@@ -23,7 +23,7 @@ const BALANCE_S: f64 = 1.0;
 const HANG_S: f64 = 8.0;
 /// Largest angle from an equilibrium at which a link counts as being there (rad).
 const NEAR_RAD: f64 = ANGLE_RAD;
-/// Ticks between two telemetry messages of a random run.
+/// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
 const TELEMETRY_TICKS: u16 = 20;
 
 /// All motions of a table, in an order in which each begins where the one before it has ended.
@@ -241,9 +241,8 @@ fn along_route(
     let mut run = RouteRun::default();
     let goals = goals(scenario, rig.tick.period_s);
     let mut harness = Harness::new(rig, table, scenario, target)?;
-    let inputs = harness.inputs();
-    harness.session.ask(Request::Telemetry(TELEMETRY_TICKS), &inputs)?;
     let mut output = harness.raise(None)?;
+    harness.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = (route.duration_s / rig.tick.period_s) as usize;
     for tick in 0..=last {
         if tick > 0 {
