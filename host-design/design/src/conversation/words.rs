@@ -63,8 +63,7 @@ pub fn inputs(telemetry: &AnyTelemetry) -> String {
 }
 
 /// What to do about [`Homing::OtherZero`].
-pub const OTHER_ZERO: &str =
-    "a link hangs elsewhere than at its absolute sensor's zero: let it hang, or correct `sensor_zero_counts`";
+pub const OTHER_ZERO: &str = "a link hangs elsewhere than at its absolute sensor's zero: let it hang, or measure the zero: `upright commission --zeros`";
 
 /// The next step that homing, sign check or motor check asks of a person; `None` if there is none.
 pub fn instruction(telemetry: &AnyTelemetry) -> Option<String> {

@@ -10,7 +10,8 @@ use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::design::detection_thresholds;
 use upright_design::harness::{Harness, record, with_firmware};
-use upright_design::rig::{LinkEncoder, Rig};
+use upright_design::reality::RealEncoders;
+use upright_design::rig::{LinkEncoder, PerJoint, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::verify::linear;
 
@@ -179,4 +180,29 @@ fn a_sensor_without_a_good_sample_is_a_fault_with_the_motor_off_too_and_comes_ag
         assert_eq!(tick(Request::Clear, false), State::Disarmed, "positions are lost");
     });
     run.unwrap();
+}
+
+#[test]
+fn a_sensor_measures_its_periodic_errors_and_an_old_angle() {
+    let mut rig = rig("double-absolute");
+    let sensors = &mut rig.reality.sensors;
+    sensors.eccentricity_rad = PerJoint::all(0.01);
+    sensors.eccentricity_phase_rad = PerJoint::all(0.3);
+    sensors.twice_per_turn_rad = PerJoint::all(0.02);
+    sensors.twice_per_turn_phase_rad = PerJoint::all(-0.5);
+    sensors.sensor_delay_s = PerJoint::all(1e-3);
+    let real = RealEncoders::of(&rig).unwrap();
+    let of = |angle: f64| 0.01 * (angle + 0.3).sin() + 0.02 * (2.0 * angle - 0.5).sin();
+    let (angle, rate) = (0.7, 3.0);
+    let then = angle - 0.003;
+    for (joint, hanging) in [(0, PI), (1, 0.0)] {
+        let mut state = vec![0.1; 6];
+        (state[2 + 2 * joint], state[3 + 2 * joint]) = (angle, rate);
+        let wanted = then + of(then) - of(hanging);
+        assert!((real.measured(2 + 2 * joint, &state) - wanted).abs() < 1e-12);
+        // The cart is measured as it is.
+        assert_eq!(real.measured(0, &state), 0.1);
+    }
+    // Negative control: without errors, there is nothing to simulate.
+    assert_eq!(RealEncoders::of(&crate::published::rig("double-absolute")), None);
 }
