@@ -13,6 +13,7 @@ use upright_design::harness::{Harness, record, with_firmware};
 use upright_design::reality::RealEncoders;
 use upright_design::rig::{LinkEncoder, PerJoint, Rig};
 use upright_design::simulate::Scenario;
+use upright_design::swing_up::Stored;
 use upright_design::verify::linear;
 
 use crate::published::{certified, rig, table};
@@ -205,4 +206,20 @@ fn a_sensor_measures_its_periodic_errors_and_an_old_angle() {
     }
     // Negative control: without errors, there is nothing to simulate.
     assert_eq!(RealEncoders::of(&crate::published::rig("double-absolute")), None);
+}
+
+#[test]
+fn another_zero_leaves_the_stored_motions_as_they_are() {
+    let path = crate::published::rig_path("double-absolute");
+    let stored = Stored::beside(&path).unwrap();
+    let mut rig = rig("double-absolute");
+    assert!(stored.is_of(&rig));
+    let changed = |rig: &mut Rig, bits, zero_counts| {
+        rig.chain_mut().unwrap().links[0].encoder =
+            Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad: 1.05e-3 });
+    };
+    changed(&mut rig, 14, 77);
+    assert!(stored.is_of(&rig));
+    changed(&mut rig, 13, 77);
+    assert!(!stored.is_of(&rig), "negative control");
 }
