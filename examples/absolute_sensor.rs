@@ -4,17 +4,16 @@
 //! `AbsoluteSensor` makes a counter of its readings that carries on where they wrap. Half a turn between two ticks is
 //! too much. In the rig file, the link has `sensor_bits = 14`.
 //!
-//! A frame that fails its check repeats the last reading; the third in a row is the fault *board*. The check finds
-//! every single wrong bit and a wire at 3.3 V, but not a wire at 0 V: that is a valid frame, of angle 0.
+//! A frame that fails its check is a bad sample: the firmware then takes what its observer predicts, and the third in a
+//! row is the fault *encoder*. The check finds every single wrong bit and a wire at 3.3 V, but not a wire at 0 V: that
+//! is a valid frame, of angle 0.
 
-use upright::board::{Board, Contacts, Inputs, Output};
+use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::{AbsoluteSensor, CounterWidth, Encoders};
 
 /// The sensor has found an error in a command.
 const ERROR_FLAG: u16 = 1 << 14;
 const ANGLE: u16 = ERROR_FLAG - 1;
-/// Bad frames in a row that are a fault.
-const MOST_BAD: u8 = 3;
 
 /// The angle in a frame, unless a bit is wrong: the first of the 16 bits makes their parity even.
 fn angle(frame: u16) -> Option<u16> {
@@ -34,8 +33,7 @@ struct Machine {
     /// The sensor with its last good angle.
     link: AbsoluteSensor,
     count: u32,
-    /// Bad frames in a row.
-    bad: u8,
+    bad: BadSamples,
 }
 
 impl Board<2> for Machine {
@@ -46,13 +44,17 @@ impl Board<2> for Machine {
     }
 
     fn inputs(&mut self) -> Inputs<2> {
-        match angle(self.frame) {
-            Some(angle) => (self.count, self.bad) = (self.link.count(angle.into()), 0),
-            None => self.bad = self.bad.saturating_add(1),
+        let angle = angle(self.frame);
+        // Sensor 0 is the cart's.
+        self.bad.now = u32::from(angle.is_none()) << 1;
+        if let Some(angle) = angle {
+            self.count = self.link.count(angle.into());
         }
-        let raw_counts = [self.cart, self.count];
-        let contacts = Contacts { board_fault: self.bad >= MOST_BAD, ..Contacts::default() };
-        Inputs { raw_counts, supply_v: 24.0, contacts }
+        Inputs { raw_counts: [self.cart, self.count], supply_v: 24.0, contacts: Contacts::default() }
+    }
+
+    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+        Some(&mut self.bad)
     }
 
     // A machine to look at: it has no motor, watchdog or clock.
@@ -67,7 +69,7 @@ impl Board<2> for Machine {
 
 fn main() {
     let link = AbsoluteSensor::new(14);
-    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link, count: 0, bad: 0 };
+    let mut machine = Machine { cart: 0, frame: frame(0x3ffe), link, count: 0, bad: BadSamples::default() };
     // As the firmware does it: homed once, and then read every tick.
     let mut encoders = Encoders::new(Machine::WIDTHS);
     encoders.home(&machine.inputs().raw_counts, &[0, 0]);
@@ -83,16 +85,12 @@ fn main() {
         assert_eq!(angle(frame(reading)), Some(reading));
         assert!((0..16).all(|bit| angle(frame(reading) ^ 1 << bit).is_none()));
     }
-    // The wire breaks and is pulled up: the reading stays, and the third tick is the fault. A good frame ends it.
-    let good = machine.frame;
-    for (frame, is_fault) in
-        [(0xffff, false), (0xffff, false), (good, false), (0xffff, false), (0xffff, false), (0xffff, true)]
-    {
+    // The wire breaks and is pulled up: the sample is bad. The next good frame is as before.
+    for (frame, bad) in [(0xffff, 0b10), (machine.frame, 0)] {
         machine.frame = frame;
-        let inputs = machine.inputs();
-        println!("{frame:#06x}: fault {}", inputs.contacts.board_fault);
-        encoders.update(&inputs.raw_counts);
-        assert_eq!((inputs.contacts.board_fault, encoders.counts()), (is_fault, &[0, -4094]));
+        encoders.update(&machine.inputs().raw_counts);
+        println!("{frame:#06x}: bad samples {:#b}", machine.bad.now);
+        assert_eq!((machine.bad.now, encoders.counts()), (bad, &[0, -4094]));
     }
     // At 0 V, the frame is that of angle 0.
     assert_eq!(angle(0), Some(0));

@@ -55,6 +55,28 @@ pub struct Inputs<const NY: usize> {
     pub contacts: Contacts,
 }
 
+/// Samples that a board knows to be bad, by parity, an error flag or the end of a range. What the observer predicts
+/// takes the place of a bad sample; the third in a row of a sensor is
+/// [`Fault::Encoder`](crate::supervision::fault::Fault::Encoder).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BadSamples {
+    /// The sensors whose samples are bad in this tick: bit i for sensor i.
+    pub now: u32,
+    /// Those of the ticks before, the latest first.
+    before: [u32; 2],
+}
+
+impl BadSamples {
+    /// Ends a tick: the next one is good. Returns the first sensor whose samples were bad in all of the last ticks.
+    pub(crate) fn finish(&mut self) -> Option<u8> {
+        let bad = core::mem::take(&mut self.now);
+        let lost = self.before.iter().fold(bad, |lost, bad| lost & bad);
+        self.before.rotate_right(1);
+        self.before[0] = bad;
+        (lost != 0).then(|| lost.trailing_zeros() as u8)
+    }
+}
+
 /// Contacts and flags of a tick; all are false in the healthy state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Contacts {
@@ -121,8 +143,14 @@ pub trait Board<const NY: usize> {
     /// the motor stays off.
     fn tick_s(&self) -> f32;
 
-    /// Reads all inputs without waiting.
+    /// Reads all inputs. Waits for nothing but the bus of sensors, for a time that does not depend on them.
     fn inputs(&mut self) -> Inputs<NY>;
+
+    /// The samples of the last [`inputs`](Self::inputs) that are known to be bad; none, if the board cannot tell:
+    /// then a tick does not pay for it.
+    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+        None
+    }
 
     /// Drives the motor with the duty of `output` until the next call, or gives its pulses, once. A drive with pulses
     /// that is enabled without pulses holds the cart.

@@ -1,6 +1,7 @@
 //! The controller: one tick from encoder counts to motor duty cycle.
 
 mod motion;
+mod prediction;
 mod steps;
 
 use crate::control::actuator::Drive;

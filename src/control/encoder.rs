@@ -67,6 +67,12 @@ impl<const NY: usize> Encoders<NY> {
         y
     }
 
+    /// The reading of a counter that moves from its last one to this position (counts).
+    pub(crate) fn reading_at(&self, counter: usize, position: i32) -> Option<u32> {
+        let moved = position.wrapping_sub(*self.position.get(counter)?);
+        Some(self.last.get(counter)?.wrapping_add(moved as u32))
+    }
+
     /// Positions in counts.
     pub fn counts(&self) -> &[i32; NY] {
         &self.position

@@ -53,8 +53,13 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         predict: impl FnOnce(&mut Firmware<'t, NX, NY, S>),
     ) {
         let begin = self.board.cycles();
-        let inputs = self.board.inputs();
+        let mut inputs = self.board.inputs();
+        let bad = self.board.bad_samples();
+        let lost = bad.and_then(|bad| self.firmware.replace_bad_samples(&mut inputs, bad));
         self.firmware.accept(&inputs);
+        if let Some(sensor) = lost {
+            self.firmware.lose_sensor(sensor);
+        }
         let output = act(&mut self.firmware, &inputs);
         self.board.drive(output);
         let log = self.firmware.log_tick();

@@ -22,6 +22,7 @@
 //! The answer to a new request goes into `commands.rs`, a new condition on arming
 //! into `posture.rs`, a new field of telemetry into `telemetry.rs`.
 
+mod bad_samples;
 mod balancing;
 mod commands;
 pub mod control_task;
@@ -399,7 +400,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let found = self.calibration.update_rail_homing(counts, &self.contacts, &self.table.limits);
         match found.and_then(|position| Ok((position, self.drive_to_switches(counts)?))) {
             // Tried again in the next tick, until the links hang where their sensors' zeros say.
-            Ok((Some(position), true)) => _ = self.home(&position),
+            Ok((Some(position), true)) => {
+                if self.home(&position).is_err() {
+                    self.calibration.set_other_zero();
+                }
+            }
             Ok(_) => {}
             Err(WrongTravel) => {
                 self.supervisor.disarm();
@@ -411,6 +416,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// Homes with the sensors at `position`, or, if they are absolute, where their own zeros say.
     fn home(&mut self, position: &[i32; NY]) -> Result<(), Inhibits> {
         let table = self.table;
+        self.supervisor.check_homing_allowed()?;
         let position = table.absolute.positions(position, &self.raw_counts, &table.limits);
         let position = position.ok_or(Inhibits::OTHER_ZERO)?;
         self.supervisor.complete_homing()?;

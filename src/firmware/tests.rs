@@ -111,6 +111,37 @@ fn the_cart_is_homed_between_its_switches() {
 }
 
 #[test]
+fn homing_by_switches_tells_that_a_link_hangs_elsewhere_than_at_its_zero() {
+    let homed = |zero_counts: i32| {
+        let mut table = TABLE;
+        table.absolute.zero_counts[1] = zero_counts;
+        table.crc = table.checksum();
+        let mut firmware = firmware(&table, Reset::Power);
+        let command = Command { id: 1, request: Request::HomeRail };
+        firmware.control(&INPUTS);
+        firmware.finish(Some(&command), 0);
+        for tick in 0..1000 {
+            let limits = &table.limits;
+            let contacts =
+                Contacts { limit_low: tick < 3, limit_high: (3..6).contains(&tick), ..INPUTS.contacts };
+            let mut raw_counts = [0; SENSORS];
+            raw_counts[0] = if tick < 3 { 0 } else { limits.travel_counts[0] as u32 };
+            firmware.control(&Inputs { raw_counts, contacts, ..INPUTS });
+            firmware.finish(None, 0);
+        }
+        let told = firmware.calibration.homing();
+        let refused = firmware.home(&TABLE.limits.rest_counts);
+        firmware.trip(Fault::EmergencyStop, None);
+        (told, refused, firmware.home(&TABLE.limits.rest_counts))
+    };
+    use crate::supervision::homing::Homing;
+    // While homing is forbidden, that is the reason, whatever the zeros.
+    let forbidden = Err(Inhibits::FAULT);
+    assert_eq!(homed(500), (Homing::OtherZero, Err(Inhibits::OTHER_ZERO), forbidden));
+    assert_eq!(homed(3), (Homing::Homed, Ok(()), forbidden));
+}
+
+#[test]
 fn a_rail_of_another_length_is_not_homed() {
     let mut firmware = firmware(&TABLE, Reset::Power);
     let command = Command { id: 1, request: Request::HomeRail };

@@ -19,7 +19,7 @@ use crate::supervision::supervisor::State;
 use crate::table::{Equilibrium, Law};
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 8;
+pub const PROTOCOL: u8 = 9;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

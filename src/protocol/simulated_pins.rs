@@ -12,6 +12,9 @@ pub const MAX_PINS_IN: usize = 192;
 /// Longest frame of [`PinsOut`].
 pub const MAX_PINS_OUT: usize = 32;
 
+/// Added to the reading of a link's sensor, which has 16 bits: the sample is bad, as a board may know by parity.
+pub const BAD_SAMPLE: u32 = 1 << 16;
+
 /// Host to image: the inputs of one tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PinsIn<const NY: usize> {

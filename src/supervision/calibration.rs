@@ -107,6 +107,11 @@ impl<const NY: usize> Calibration<NY> {
         self.swinging.forget();
     }
 
+    /// Records that a link hangs elsewhere than at its absolute sensor's zero: homing waits.
+    pub fn set_other_zero(&mut self) {
+        self.homing = Homing::OtherZero;
+    }
+
     /// Starts homing by the limit switches.
     pub fn start_rail_homing(&mut self) {
         self.rail = Rail::default();
@@ -160,7 +165,7 @@ impl<const NY: usize> Calibration<NY> {
     /// Cancels homing and a sign check that are in progress; what is finished stays.
     #[inline(never)]
     pub fn cancel(&mut self) {
-        if matches!(self.homing, Homing::Touch { .. } | Homing::HoldStill) {
+        if !matches!(self.homing, Homing::Homed | Homing::WrongTravel) {
             self.homing = Homing::NotHomed;
         }
         self.signs.cancel();

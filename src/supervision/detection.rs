@@ -268,6 +268,11 @@ impl<const NY: usize> Detection<NY> {
         self.sensors.map(|sensor| sensor.moved)
     }
 
+    /// Counts a measurement that was rejected before the tests.
+    pub(crate) fn count_rejected(&mut self) {
+        self.rejected = self.rejected.saturating_add(1);
+    }
+
     /// Number of measurements rejected since power-up or the last [`reset_rejected`](Self::reset_rejected).
     pub fn rejected(&self) -> u32 {
         self.rejected.saturating_add(self.pushes.rejected())

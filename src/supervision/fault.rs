@@ -156,7 +156,8 @@ impl Fault {
             fault: Fault::Encoder,
             name: "encoder",
             condition: "three measurements in a row of one encoder contradict the model: it jumps, or, except while balancing \
-                        with a force, is reversed, swapped or late; single ones are rejected and counted",
+                        with a force, is reversed, swapped or late; or three samples fail the check of an absolute \
+                        sensor; single ones are rejected and counted",
             reaction: Reaction::Ticks(3),
             remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too, and on a stepper the \
                      drive in any case; home, and check the signs again",

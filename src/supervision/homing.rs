@@ -24,6 +24,8 @@ pub enum Homing {
     /// Not homed: the distance between the switches differs from the rig file's, a switch does not open, or a drive has
     /// not come to it.
     WrongTravel,
+    /// As [`HoldStill`](Self::HoldStill), but a link hangs elsewhere than at its absolute sensor's zero.
+    OtherZero,
 }
 
 /// Cart counts at which the limit switches were pressed.

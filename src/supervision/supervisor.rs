@@ -104,7 +104,11 @@ impl Supervisor {
         Ok(())
     }
 
-    fn check_homing_allowed(&self) -> Result<(), Inhibits> {
+    /// Whether homing is allowed.
+    ///
+    /// # Errors
+    /// The inhibits that hold.
+    pub fn check_homing_allowed(&self) -> Result<(), Inhibits> {
         match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Ok(()),
             State::Jogging

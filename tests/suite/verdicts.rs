@@ -16,7 +16,11 @@ const TOLERANCE: f64 = 0.2;
 /// Rig, law and imperfection.
 type Row = (&'static str, Law, &'static str);
 /// Some rows of each rig, and whether the set-point moves.
-const SAMPLE: [(Row, bool); 12] = [
+const SAMPLE: [(Row, bool); 16] = [
+    (("single-absolute", Law::Lqr, "eccentricity_rad"), false),
+    (("single-absolute", Law::PolePlacement, "twice_per_turn_rad"), false),
+    (("double-absolute", Law::Lqr, "twice_per_turn_rad"), true),
+    (("double-absolute", Law::PolePlacement, "sensor_delay_s"), false),
     (("quadruple-paper", Law::Lqr, "cart_friction_n"), false),
     (("quadruple-paper", Law::PolePlacement, "homing_error_rad"), false),
     (("quadruple-paper", Law::Lqr, "driver_lag_s"), false),

@@ -62,6 +62,9 @@ pub fn inputs(telemetry: &AnyTelemetry) -> String {
     format!("supply {:.1} V, active inputs: {active}", telemetry.supply_v)
 }
 
+/// What to do about [`Homing::OtherZero`].
+pub const OTHER_ZERO: &str = "a link hangs elsewhere than at its absolute sensor's zero: let it hang, or measure the zero: `upright commission --zeros`";
+
 /// The next step that homing, sign check or motor check asks of a person; `None` if there is none.
 pub fn instruction(telemetry: &AnyTelemetry) -> Option<String> {
     let move_it = |sensor: u8| match sensor {
@@ -76,6 +79,7 @@ pub fn instruction(telemetry: &AnyTelemetry) -> Option<String> {
         (Homing::HoldStill, _) => {
             Some("let the links hang still, or swing for 15 s, away from the switches".to_owned())
         }
+        (Homing::OtherZero, _) => Some(OTHER_ZERO.to_owned()),
         (Homing::WrongTravel, _) => {
             Some("the switches are not as far apart as the rig file says; check them, home again".to_owned())
         }

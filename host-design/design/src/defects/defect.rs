@@ -113,6 +113,9 @@ defects! {
     PulsesMissing Nothing "a stepper misses 50 to 95 % of its pulses" => Off(20);
     SomePulsesMissing Nothing "a stepper misses 5 to 50 % of its pulses" => Bounded;
     StepsLost Nothing "a stepper misses all pulses of 1 to 10 ticks, then follows again" => Bounded;
+    SensorDead Nothing "an absolute sensor reads 0 or all ones: its wire is open, or it has lost its magnet" => Off(10);
+    SensorBit Nothing "a bit of an absolute sensor's reading is wrong in one of 5 to 50 ticks" => Bounded;
+    SampleInvalid Nothing "a board knows that all readings of an absolute sensor are bad" => Fault(F::Encoder, Exactly(3));
 }
 
 impl Defect {
@@ -142,6 +145,11 @@ impl Defect {
         )
     }
 
+    /// Whether only an absolute sensor can have it.
+    pub fn is_of_absolute(self) -> bool {
+        matches!(self, Self::SensorDead | Self::SensorBit | Self::SampleInvalid)
+    }
+
     /// Whether it is found by a threshold of the gain table: without thresholds it must be missed.
     pub fn needs_detection(self) -> bool {
         matches!(
@@ -157,6 +165,7 @@ impl Defect {
                 | Self::EncoderWireOpen
                 | Self::CartJammed
                 | Self::PulsesMissing
+                | Self::SensorDead
         )
     }
 }

@@ -80,6 +80,7 @@ impl Defect {
             // There is no observer: only what leads beyond a limit is found. The log shows the rest to the host.
             Defect::BadSample
             | Defect::EncoderJump
+            | Defect::SensorDead
             | Defect::EncoderReversed
             | Defect::EncodersSwapped
             | Defect::MotorDead

@@ -4,8 +4,10 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use upright::board::Output;
 use upright::control::actuator::Drive;
+use upright::control::encoder::AbsoluteSensor;
 use upright::protocol::frame::DELIMITER;
 use upright::protocol::message::{Command, Request};
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::table::Thresholds;
 
 use super::defect::Defect;
@@ -45,6 +47,32 @@ pub struct Injection<'a> {
     full_force_n: f64,
     push_ticks: usize,
     supply_ticks: usize,
+    /// What a board makes of the readings of a defective absolute sensor.
+    board: Option<AbsoluteReading>,
+}
+
+/// A board's count for an absolute sensor.
+struct AbsoluteReading {
+    sensor: AbsoluteSensor,
+    /// Bits of a reading.
+    bits: u32,
+    /// Its counter for a count of 0.
+    at_zero: u32,
+}
+
+impl AbsoluteReading {
+    /// That of this sensor, whose counter is `counter`.
+    fn of(table: &TableValues, sensor: usize, counter: u32) -> Self {
+        let bits = table.limits.turn_counts[sensor].max(1).ilog2();
+        let mut board = AbsoluteSensor::new(bits);
+        let at_zero = counter.wrapping_sub(board.count(counter & ((1 << bits) - 1)));
+        Self { sensor: board, bits, at_zero }
+    }
+
+    /// The counter for a reading, of which only the bits that the sensor has are taken.
+    fn counter(&mut self, reading: u32) -> u32 {
+        self.at_zero.wrapping_add(self.sensor.count(reading & ((1 << self.bits) - 1)))
+    }
 }
 
 /// Largest force of a push (N): the motor's; on a rig whose cart goes where its pulses say, a twentieth of its links'
@@ -54,6 +82,11 @@ pub fn push_limit_n(rig: &Rig, table: &TableValues) -> f64 {
         Some(chain) => 0.05 * chain.gravity_m_per_s2 * chain.links_mass_kg(),
         None => f64::from(table.force_limit_n),
     }
+}
+
+/// Number of ticks from one error to the next, for a defect of this severity.
+fn every(size: f64) -> usize {
+    5 + (45.0 * size) as usize
 }
 
 impl<'a> Injection<'a> {
@@ -83,6 +116,7 @@ impl<'a> Injection<'a> {
             full_force_n: push_limit_n(rig, table),
             push_ticks: ticks(PUSH_S),
             supply_ticks: table.limits.supply_ticks as usize,
+            board: None,
         }
     }
 
@@ -101,7 +135,7 @@ impl<'a> Injection<'a> {
         if self.past.len() > 2 * LONGEST_LATENESS {
             self.past.drain(..LONGEST_LATENESS);
         }
-        let contacts = &mut inputs.contacts;
+        let (contacts, surge) = (&mut inputs.contacts, 1.3 + 0.3 * size as f32);
         let moved = |sensor: usize| Bench::signed(sensor, truth[sensor].wrapping_sub(began[sensor]));
         let off = (self.visible_counts[sensor] as f64 * (2.0 + 18.0 * size) * sign) as i64;
         let shows = |sensor: usize, counts: i64| (sensor, began[sensor].wrapping_add(counts as u32));
@@ -112,10 +146,8 @@ impl<'a> Injection<'a> {
             Defect::SupplyDip if since < self.supply_ticks => {
                 inputs.supply_v = self.table.limits.supply_min_v * (0.2 + 0.7 * size as f32);
             }
-            Defect::SupplySurge => inputs.supply_v *= 1.3 + 0.3 * size as f32,
-            Defect::SupplySpike if since < 1 + usize::from(size > 0.5) => {
-                inputs.supply_v *= 1.3 + 0.3 * size as f32;
-            }
+            Defect::SupplySurge => inputs.supply_v *= surge,
+            Defect::SupplySpike if since < 1 + usize::from(size > 0.5) => inputs.supply_v *= surge,
             Defect::EmergencyStop if since == 0 => contacts.emergency_stop = true,
             Defect::DriverFault if since == 0 => contacts.driver_fault = true,
             Defect::LimitSwitch if since < PRESSED_TICKS && sign > 0.0 => contacts.limit_high = true,
@@ -136,9 +168,14 @@ impl<'a> Injection<'a> {
                 shown.push(shows(sensor + 1, moved(sensor)));
             }
             Defect::CountsLost => {
-                let every = 5 + (45.0 * size) as usize;
-                shown.push(shows(sensor, moved(sensor) - (sign * (since / every) as f64) as i64));
+                let lost = sign * (since / every(size)) as f64;
+                shown.push(shows(sensor, moved(sensor) - lost as i64));
             }
+            Defect::SensorDead | Defect::SensorBit => {
+                let reading = [truth[sensor], began[sensor]];
+                shown.push((sensor, self.of_reading(since, reading)));
+            }
+            Defect::SampleInvalid => inputs.raw_counts[sensor] |= BAD_SAMPLE,
             Defect::SensorLate => {
                 let late = 1 + ((LONGEST_LATENESS - 1) as f64 * size) as usize;
                 let then = self.past[self.past.len().saturating_sub(1 + late)][sensor];
@@ -149,6 +186,20 @@ impl<'a> Injection<'a> {
             _ => {}
         }
         self.show(&shown, &truth, inputs)
+    }
+
+    /// The counter that a board makes of the readings of a defective absolute sensor, whose counter would be `truth`,
+    /// and was `began` at the onset.
+    fn of_reading(&mut self, since: usize, [truth, began]: [u32; 2]) -> u32 {
+        let Trial { kind, sensor, sign, size, .. } = self.trial;
+        let table = self.table;
+        let board = self.board.get_or_insert_with(|| AbsoluteReading::of(table, sensor, began));
+        board.counter(match kind {
+            Defect::SensorDead if sign > 0.0 => u32::MAX,
+            Defect::SensorDead => 0,
+            _ if since.is_multiple_of(every(size)) => truth ^ 1 << self.random.random_range(0..board.bits),
+            _ => truth,
+        })
     }
 
     /// Sets encoders to wrong counters; returns whether one is visibly wrong.

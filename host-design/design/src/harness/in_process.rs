@@ -4,13 +4,14 @@
 //! applies only to the code in this file; everything around a [`Target`] is compiled once.
 
 use heapless::spsc::Queue;
-use upright::board::{Board, Inputs, Output};
+use upright::board::{BadSamples, Board, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
 use upright::protocol::frame::FrameError;
 use upright::protocol::message::{Command, Message, Reset};
 use upright::protocol::serial_link::SerialLink;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::table::{GainTable, SwingUp};
 
 use super::error::HarnessError;
@@ -122,7 +123,7 @@ impl<'q, 't, S: SwingUp<NX, NY>, const NX: usize, const NY: usize> InProcess<'q,
         let (to_control, commands) = commands.split();
         let (messages, to_link) = messages.split();
         let inputs = Inputs { raw_counts: [0; NY], supply_v: 0.0, contacts: Default::default() };
-        let wires = Wires { inputs, output: Output::OFF, tick_s: table.tick_s };
+        let wires = Wires { inputs, bad: BadSamples::default(), output: Output::OFF, tick_s: table.tick_s };
         Ok(Self {
             control: ControlTask::new(firmware, wires, commands, messages),
             link: SerialLink::new(to_control, to_link),
@@ -135,6 +136,7 @@ impl<'q, 't, S: SwingUp<NX, NY>, const NX: usize, const NY: usize> InProcess<'q,
 /// The board: inputs and output in memory.
 struct Wires<const NY: usize> {
     inputs: Inputs<NY>,
+    bad: BadSamples,
     output: Output,
     tick_s: f32,
 }
@@ -144,7 +146,15 @@ impl<const NY: usize> Board<NY> for Wires<NY> {
     const GIVES_PULSES: bool = true;
 
     fn inputs(&mut self) -> Inputs<NY> {
+        // The cart's counter has 32 bits.
+        let links = self.inputs.raw_counts.iter().enumerate().skip(1);
+        let is_bad = |(sensor, reading): (usize, &u32)| u32::from(reading & BAD_SAMPLE != 0) << sensor;
+        self.bad.now = links.map(is_bad).sum();
         self.inputs
+    }
+
+    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+        Some(&mut self.bad)
     }
 
     fn tick_s(&self) -> f32 {

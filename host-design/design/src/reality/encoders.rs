@@ -2,9 +2,10 @@
 
 use core::f64::consts::PI;
 
-use crate::rig::{Rig, SensorErrors};
+use crate::rig::{PerJoint, Rig, SensorErrors};
 
-/// What the encoders measure instead of the joints' angles: `θ + e + a (sin(θ + p) - sin(h + p))` for each joint.
+/// What the encoders measure instead of the joints' angles: `θ + e + a (sin(θ + p) - sin(h + p))` for each joint, plus
+/// `b (sin(2 θ + q) - sin(2 h + q))` for an error twice per turn. A reading that is old is that of `θ - delay · θ'`.
 ///
 /// `e` is the zero error from homing, and `h` is the joint's angle at homing. The links are homed hanging, so `h` is π
 /// for the first joint and 0 for the others, and there the eccentricity causes no error. (Amplitude and phase of an
@@ -17,39 +18,57 @@ pub struct RealEncoders {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Joint {
     zero_error: f64,
-    amplitude: f64,
-    phase: f64,
+    /// Amplitude and phase of the error once per turn, and of that twice per turn.
+    harmonics: [[f64; 2]; 2],
+    /// Their sum at homing.
     at_homing: f64,
+    delay_s: f64,
 }
 
 impl RealEncoders {
     /// The encoders of a rig; none if they have no error.
     pub fn of(rig: &Rig) -> Option<Self> {
         let errors = &rig.reality.sensors;
-        (errors.homing_error_rad.is_any() || errors.eccentricity_rad.is_any())
+        let SensorErrors { homing_error_rad, eccentricity_rad, twice_per_turn_rad, sensor_delay_s, .. } =
+            errors;
+        [homing_error_rad, eccentricity_rad, twice_per_turn_rad, sensor_delay_s]
+            .into_iter()
+            .any(PerJoint::is_any)
             .then(|| Self { joints: (0..rig.links()).map(|joint| Joint::of(errors, joint)).collect() })
     }
 
-    /// Measured value of the state with this index, whose true value is `value`. Only angles have errors.
-    pub fn measured(&self, state: usize, value: f64) -> f64 {
-        let joint = (state / 2).checked_sub(1).and_then(|joint| self.joints.get(joint));
-        joint.filter(|_| state.is_multiple_of(2)).map_or(value, |joint| joint.measured(value))
+    /// Measured value of the position with this index in `state`. Only angles have errors.
+    pub fn measured(&self, index: usize, state: &[f64]) -> f64 {
+        let joint = (index / 2).checked_sub(1).and_then(|joint| self.joints.get(joint));
+        let rate = state.get(index + 1).copied().unwrap_or_default();
+        joint
+            .filter(|_| index.is_multiple_of(2))
+            .map_or(state[index], |joint| joint.measured(state[index], rate))
     }
 }
 
 impl Joint {
     fn of(errors: &SensorErrors, joint: usize) -> Self {
-        let phase = errors.eccentricity_phase_rad.of(joint);
-        Self {
+        let once = [errors.eccentricity_rad.of(joint), errors.eccentricity_phase_rad.of(joint)];
+        let twice = [errors.twice_per_turn_rad.of(joint), errors.twice_per_turn_phase_rad.of(joint)];
+        let mut of = Self {
             zero_error: errors.homing_error_rad.of(joint),
-            amplitude: errors.eccentricity_rad.of(joint),
-            phase,
-            at_homing: libm::sin(if joint == 0 { PI } else { 0.0 } + phase),
-        }
+            harmonics: [once, twice],
+            at_homing: 0.0,
+            delay_s: errors.sensor_delay_s.of(joint),
+        };
+        of.at_homing = of.periodic(if joint == 0 { PI } else { 0.0 });
+        of
     }
 
-    fn measured(&self, angle: f64) -> f64 {
-        angle + self.zero_error + self.amplitude * (libm::sin(angle + self.phase) - self.at_homing)
+    fn periodic(&self, angle: f64) -> f64 {
+        let [[once, phase], [twice, phase_of_twice]] = self.harmonics;
+        once * libm::sin(angle + phase) + twice * libm::sin(2.0 * angle + phase_of_twice)
+    }
+
+    fn measured(&self, angle: f64, rate: f64) -> f64 {
+        let then = angle - self.delay_s * rate;
+        then + self.zero_error + (self.periodic(then) - self.at_homing)
     }
 }
 

@@ -168,7 +168,7 @@ impl Bench {
             }
             let state = sensor.state;
             let mut position = match &self.encoders {
-                Some(errors) => errors.measured(state, self.state[state]),
+                Some(errors) => errors.measured(state, &self.state),
                 None => self.state[state],
             };
             if sensor.noise > 0.0 {

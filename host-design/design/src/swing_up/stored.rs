@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::SwingUpError;
 use super::problem::Knots;
-use crate::rig::Rig;
+use crate::rig::{LinkEncoder, Rig};
 
 /// Both motions as they are stored in the file beside the rig file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -71,10 +71,17 @@ pub(super) fn header(rig: &str, hash: &str) -> String {
     format!("{{\n\"rig\": {},\n\"hash\": {}", json!(rig), json!(hash))
 }
 
-/// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included.
+/// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included, but not the zeros of
+/// absolute sensors, which no motion depends on.
 pub(super) fn request_hash(rig: &Rig) -> String {
+    let mut rig = rig.clone();
+    for link in rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links) {
+        if let Some(LinkEncoder::Absolute { zero_counts, .. }) = &mut link.encoder {
+            *zero_counts = 0;
+        }
+    }
     // Serialising plain structs of numbers and strings into memory cannot fail.
-    let values = serde_json::to_vec(&(rig, &rig.swing_up)).expect("a rig is representable as JSON");
+    let values = serde_json::to_vec(&(&rig, &rig.swing_up)).expect("a rig is representable as JSON");
     Sha256::digest(values).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 

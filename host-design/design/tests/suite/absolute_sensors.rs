@@ -3,17 +3,21 @@
 use core::f64::consts::PI;
 
 use upright::protocol::message::{Answer, Request};
+use upright::protocol::simulated_pins::BAD_SAMPLE;
+use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::design::detection_thresholds;
 use upright_design::harness::{Harness, record, with_firmware};
-use upright_design::rig::{LinkEncoder, Rig};
+use upright_design::reality::RealEncoders;
+use upright_design::rig::{LinkEncoder, PerJoint, Rig};
 use upright_design::simulate::Scenario;
+use upright_design::swing_up::Stored;
 use upright_design::verify::linear;
 
 use crate::published::{certified, rig, table};
-use crate::supervised::{ALL_RIGS, ask, tick};
+use crate::supervised::{ALL_RIGS, ask, balancing, cause, rejected, tick};
 
 /// Reading while the links hang: the first link wraps on its way up, and all of them near upright or hanging.
 const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
@@ -98,4 +102,124 @@ fn noise_of_a_sensor_reaches_observer_thresholds_and_verify() {
         noise.iter().find(|share| share.source == "encoder 2").unwrap().states[2]
     };
     assert!(ripple(&noisy) > 2.0 * ripple(&quiet), "{} {}", ripple(&noisy), ripple(&quiet));
+}
+
+/// What the supervisor says of samples of a link that are bad in these ticks after the release, and how far any link
+/// leans in 2000 ticks (rad).
+fn with_bad_samples(
+    rig: &Rig,
+    sensor: usize,
+    is_bad: impl Fn(u32) -> bool,
+) -> (Option<Cause>, u32, u32, f64) {
+    let (values, scenario) = (table(rig), Scenario::at_rest(rig, Law::Lqr));
+    let watched = balancing(rig, &values, &scenario, |harness| {
+        let (mut lean_rad, mut ticks) = (0.0f64, 0);
+        let before = rejected(harness);
+        for tick in 0..2000 {
+            let mut inputs = harness.inputs();
+            if is_bad(tick) {
+                inputs.raw_counts[sensor] ^= BAD_SAMPLE | 0x1234;
+            }
+            let output = harness.session.tick(&inputs).unwrap();
+            harness.bench.tick(output.drive);
+            if !output.enable {
+                break;
+            }
+            lean_rad =
+                harness.bench.state()[2..].iter().step_by(2).fold(lean_rad, |lean, x| lean.max(x.abs()));
+            ticks += 1;
+        }
+        (cause(harness), ticks, rejected(harness) - before, lean_rad)
+    });
+    watched.unwrap()
+}
+
+#[test]
+fn the_prediction_takes_the_place_of_bad_samples_and_the_third_in_a_row_is_a_fault_of_that_sensor() {
+    for (name, noise_rad) in ALL_RIGS.iter().zip([4e-4, 2e-4, 1e-4, 2e-5]) {
+        let rig = absolute(name, noise_rad);
+        let sensors = rig.sensors().len();
+        let (_, _, none, quiet_rad) = with_bad_samples(&rig, 1, |_| false);
+        assert_eq!(none, 0, "{name}");
+        for sensor in 1..sensors {
+            // One in five, and then two of them: survived, and hardly seen.
+            for (in_a_row, most) in [(1, 1.5), (2, 3.0)] {
+                let (cause, ticks, bad, lean_rad) =
+                    with_bad_samples(&rig, sensor, |tick| tick % 5 < in_a_row);
+                let what = format!("{name} {sensor}: {cause:?} {bad} {lean_rad} {quiet_rad}");
+                assert!((cause, ticks) == (None, 2000) && bad == 400 * in_a_row, "{what}");
+                assert!(lean_rad < most * quiet_rad + 1e-3, "{what}");
+            }
+            // From tick 100 on.
+            let (cause, ticks, ..) = with_bad_samples(&rig, sensor, |tick| tick >= 100);
+            let found = cause.map(|cause| (cause.fault, cause.sensor));
+            assert_eq!((found, ticks), (Some((Fault::Encoder, Some(sensor as u8))), 102), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_sensor_without_a_good_sample_is_a_fault_with_the_motor_off_too_and_comes_again() {
+    let rig = absolute("single-quanser-ip02", 4e-4);
+    let (values, scenario) = (table(&rig), Scenario::at_rest(&rig, Law::Lqr));
+    let run = with_firmware(&values, |target| {
+        let mut harness = Harness::new(&rig, &values, &scenario, target).unwrap();
+        let mut tick = |request, is_bad: bool| {
+            harness.session.send(request);
+            for _ in 0..300 {
+                harness.bench.hold(&[0.0, 0.0, PI, 0.0]);
+                let mut inputs = harness.inputs();
+                inputs.raw_counts[1] ^= if is_bad { BAD_SAMPLE | 0x1234 } else { 0 };
+                harness.session.tick(&inputs).unwrap();
+            }
+            harness.session.status().state
+        };
+        assert_eq!(tick(Request::Statistics, false), State::Disarmed);
+        assert_eq!(tick(Request::Home, false), State::Calibrated);
+        assert_eq!(tick(Request::Cause, true), State::Fault);
+        assert_eq!(tick(Request::Clear, true), State::Fault, "it comes again");
+        assert_eq!(tick(Request::Clear, false), State::Disarmed, "positions are lost");
+    });
+    run.unwrap();
+}
+
+#[test]
+fn a_sensor_measures_its_periodic_errors_and_an_old_angle() {
+    let mut rig = rig("double-absolute");
+    let sensors = &mut rig.reality.sensors;
+    sensors.eccentricity_rad = PerJoint::all(0.01);
+    sensors.eccentricity_phase_rad = PerJoint::all(0.3);
+    sensors.twice_per_turn_rad = PerJoint::all(0.02);
+    sensors.twice_per_turn_phase_rad = PerJoint::all(-0.5);
+    sensors.sensor_delay_s = PerJoint::all(1e-3);
+    let real = RealEncoders::of(&rig).unwrap();
+    let of = |angle: f64| 0.01 * (angle + 0.3).sin() + 0.02 * (2.0 * angle - 0.5).sin();
+    let (angle, rate) = (0.7, 3.0);
+    let then = angle - 0.003;
+    for (joint, hanging) in [(0, PI), (1, 0.0)] {
+        let mut state = vec![0.1; 6];
+        (state[2 + 2 * joint], state[3 + 2 * joint]) = (angle, rate);
+        let wanted = then + of(then) - of(hanging);
+        assert!((real.measured(2 + 2 * joint, &state) - wanted).abs() < 1e-12);
+        // The cart is measured as it is.
+        assert_eq!(real.measured(0, &state), 0.1);
+    }
+    // Negative control: without errors, there is nothing to simulate.
+    assert_eq!(RealEncoders::of(&crate::published::rig("double-absolute")), None);
+}
+
+#[test]
+fn another_zero_leaves_the_stored_motions_as_they_are() {
+    let path = crate::published::rig_path("double-absolute");
+    let stored = Stored::beside(&path).unwrap();
+    let mut rig = rig("double-absolute");
+    assert!(stored.is_of(&rig));
+    let changed = |rig: &mut Rig, bits, zero_counts| {
+        rig.chain_mut().unwrap().links[0].encoder =
+            Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad: 1.05e-3 });
+    };
+    changed(&mut rig, 14, 77);
+    assert!(stored.is_of(&rig));
+    changed(&mut rig, 13, 77);
+    assert!(!stored.is_of(&rig), "negative control");
 }

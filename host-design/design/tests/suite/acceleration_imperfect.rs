@@ -37,7 +37,7 @@ fn every_imperfection_of_a_stepper_has_a_size_or_a_reason() {
     let rig = rig("double-stepper");
     let found = imperfections(&rig, &table(&rig), Law::Lqr, &settings(&rig), &|| ()).unwrap();
     let of = |key: &str| found.alone.iter().find(|one| one.imperfection.key == key).unwrap();
-    assert_eq!((found.alone.len(), found.left_out.len()), (5, 6));
+    assert_eq!((found.alone.len(), found.left_out.len()), (7, 6));
     let falls_at = of("joint_friction_n_m").falls_at.unwrap();
     assert!((1e-3..1e-2).contains(&falls_at), "{falls_at}");
     let eccentric = of("eccentricity_rad");

@@ -30,7 +30,7 @@ fn arrives_with(rig: &Rig, motions: &RaiseAndLower) -> bool {
 /// `motions` checks each tick against the adaptive integrator, and each limit.
 #[test]
 fn every_stored_motion_obeys_the_equations_and_the_limits_and_arrives() {
-    for name in RIGS {
+    for name in RIGS.into_iter().chain(["single-absolute", "double-absolute"]) {
         let (rig, table) = rig_and_table_with_motions(name);
         for seed in 1..=2 {
             assert!(arrives(rig, table, seed, false), "{name}, seed {seed}");

@@ -15,8 +15,13 @@ use upright_design::study::Study;
 use upright_design::swing_up::{Condition, RandomRuns, firmware_runs, hangs, margins, up_and_down};
 use upright_design::table::TableValues;
 
-const RIGS: [&str; 4] =
-    ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
+const RIGS: [&str; 5] = [
+    "single-quanser-ip02",
+    "double-quanser-dbpen",
+    "triple-glueck-eder-kugi",
+    "quadruple-paper",
+    "single-absolute",
+];
 
 /// The rig and its table with the stored motions.
 fn with_stored_motions(name: &'static str) -> (Rig, TableValues) {
@@ -37,7 +42,7 @@ fn run(rig: &Rig, table: &TableValues, scenario: &Scenario) -> Result<Recording,
 
 #[test]
 fn every_rig_is_raised_balanced_and_lowered_from_encoders() {
-    for name in RIGS {
+    for name in RIGS.into_iter().chain(["double-absolute"]) {
         let (rig, table) = with_stored_motions(name);
         let recording = run(&rig, &table, &scenario(&rig, &table, 1)).unwrap();
         assert!(hangs(&recording), "{name}: {:?}, {:?}", recording.fault, recording.ticks.last());

@@ -6,6 +6,7 @@ use upright::protocol::message::Request;
 use upright::supervision::homing::Homing;
 use upright::supervision::slow_drive::HOMING_M_PER_S;
 use upright_design::client::AnyTelemetry;
+use upright_design::conversation::words::OTHER_ZERO;
 
 use super::guide::Guide;
 use super::machine::Stop;
@@ -41,7 +42,7 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
             let is_there = match (now.homing, end) {
                 (Homing::Touch { low, .. }, End::Low) => low,
                 (Homing::Touch { high, .. }, End::High) => high,
-                (Homing::HoldStill | Homing::WrongTravel, _) => true,
+                (Homing::HoldStill | Homing::OtherZero | Homing::WrongTravel, _) => true,
                 _ => false,
             };
             is_there.then(|| now.counts.iter().map(|&count| f64::from(count)).collect::<Vec<_>>())
@@ -63,18 +64,27 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
         moved[0] * step(plan, 0),
         wanted_m(plan)
     ));
-    let is_homed = |now: &AnyTelemetry| now.homing == Homing::Homed;
-    if is_driven {
+    rest_between(guide, plan)
+}
+
+/// Between the switches, the links come to rest, and the rig is homed.
+fn rest_between(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
+    let is_homed = |now: &AnyTelemetry| (now.homing == Homing::Homed).then_some(());
+    let homed = if plan.table.steps.is_some() {
         // It goes to the middle by itself, and homes as soon as the links hang still.
         guide.ask(PersonTask::Rest)?;
-        let homed = guide.wait(longest(plan), |now| is_homed(now).then_some(()))?;
-        if homed.is_none() {
-            return Err(Stop::Machine("cart and links do not come to rest between the switches".to_owned()));
-        }
-        return Ok(());
-    }
-    guide.ask(PersonTask::Centre)?;
-    guide.need(is_homed, "cart and links do not come to rest between the switches")
+        guide.wait(longest(plan), is_homed)?
+    } else {
+        guide.ask(PersonTask::Centre)?;
+        guide.wait_for_person(is_homed)?
+    };
+    homed.ok_or_else(|| {
+        let homing = guide.conversation().telemetry.as_ref().map(|now| now.homing);
+        Stop::Machine(match homing {
+            Some(Homing::OtherZero) => OTHER_ZERO.to_owned(),
+            _ => "cart and links do not come to rest between the switches".to_owned(),
+        })
+    })
 }
 
 /// Longest time in which a drive with pulses goes from end to end, and the links come to rest.

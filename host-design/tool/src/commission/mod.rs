@@ -33,6 +33,7 @@ mod signs;
 mod simulated;
 mod step;
 mod task;
+mod zeros;
 
 pub use at_port::AtPort;
 pub use commissioning::Commissioning;
@@ -44,3 +45,4 @@ pub use record::{CommissionOutcome, CommissionRecord, Journal, StepRecord};
 pub use simulated::Simulated;
 pub use step::CommissionStep;
 pub use task::{End, PersonTask};
+pub use zeros::measured_zeros;

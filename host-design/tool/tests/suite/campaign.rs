@@ -47,6 +47,24 @@ fn every_defect_of_a_stepper_is_found_and_nothing_else() {
 }
 
 #[test]
+fn defects_of_absolute_sensors_are_found_or_survived_and_only_they_have_them() {
+    let of_absolute = |table| kinds(table, RunPlace::Host).into_iter().filter(|kind| kind.is_of_absolute());
+    for name in ["single-absolute", "double-absolute"] {
+        let (rig, table) = rig_and_table(name);
+        let kinds: Vec<Defect> = of_absolute(table).collect();
+        assert_eq!(kinds.len(), 3);
+        for row in run(&on_host(rig, table), &kinds, 20 * kinds.len() as u64).rows {
+            println!("{name}: {row:?}");
+            assert!(row.wrong.is_empty() && row.runs == 20, "{name}: {row:?}");
+        }
+        // Negative control: without detection, a sensor that reads nothing is missed.
+        let blind = Setup { detection: false, ..on_host(rig, table) };
+        assert_eq!(run(&blind, &[Defect::SensorDead], 4).rows[0].missed, 4, "{name}");
+    }
+    assert_eq!(of_absolute(&rig_and_table("single-quanser-ip02").1).count(), 0);
+}
+
+#[test]
 fn without_detection_every_defect_that_needs_it_is_missed() {
     for name in ["quadruple-paper", "quadruple-stepper"] {
         missed_without_detection(name);

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use upright_design::harness::with_firmware;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
 use upright_design::table::TableValues;
 use upright_tool::commission::{
-    CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, Planted, Simulated, Stop,
+    CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, MachineAtHand, PersonTask,
+    Planted, Simulated, Stop, measured_zeros,
 };
 
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
@@ -70,6 +71,113 @@ fn a_machine_on_a_stepper_is_commissioned_and_its_defects_stop_it() {
             stopped("double-stepper", table, Some(planted), &CommissionStep::FIRST).expect("it is found");
         assert!(step == wanted && words.contains(remedy), "{name}: {step:?}: {words}");
     }
+}
+
+#[test]
+fn a_machine_with_absolute_sensors_passes_unless_the_zero_of_one_is_another() {
+    const NAME: &str = "double-absolute";
+    let (_, table) = rig_and_table(NAME);
+    assert_eq!(stopped(NAME, table, None, &CommissionStep::EARLY), None);
+    let mut other = table.clone();
+    other.absolute.zero_counts[2] += 400;
+    let (step, words) = stopped(NAME, &other, None, &CommissionStep::EARLY).expect("it is found");
+    assert!(step == CommissionStep::Homing && words.contains("--zeros"), "{step:?}: {words}");
+}
+
+/// The file of the double with absolute sensors, with these zeros.
+fn with_zeros(zeros: [u32; 2]) -> String {
+    let text = std::fs::read_to_string(path_of("double-absolute")).unwrap();
+    let [first, second] = zeros.map(|zero| format!("sensor_zero_counts = {zero}\n"));
+    text.replace("sensor_zero_counts = 9021\n", &first).replace("sensor_zero_counts = 12\n", &second)
+}
+
+#[test]
+fn the_zeros_of_absolute_sensors_are_measured_and_nothing_else_of_the_file_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [true_machine, new] = ["true.toml", "new.toml"].map(|file| folder.path().join(file));
+    std::fs::write(&true_machine, with_zeros([16_383, 5000])).unwrap();
+    let [true_machine, new] = [&true_machine, &new].map(|file| file.to_str().unwrap());
+    let rig = path_of("double-absolute");
+    let command =
+        ["commission", &rig, "--target", "host", "--machine", true_machine, "--zeros", "--write", new];
+    let output = upright(&command);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let text = std::fs::read_to_string(new).unwrap();
+    let found: Vec<u32> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("sensor_zero_counts = ").map(|value| value.parse().unwrap()))
+        .collect();
+    // The mean of a hundred readings or more with 2.7 counts of noise; the first zero is at the wrap.
+    assert!((found[0] + 4) % 16_384 < 6 && found[1].abs_diff(5000) <= 2, "{found:?}");
+    assert_eq!(text, with_zeros([found[0], found[1]]));
+    // A machine with the zeros of the file is homed; negative control: one with the old zeros is not.
+    let home = |file: &str| {
+        let rig = Rig::from_path(Path::new(true_machine)).unwrap();
+        let of_file = Rig::from_path(Path::new(file)).unwrap();
+        let table = crate::published::table(&of_file);
+        let mut journal = Journal::new(CommissionRecord::new(&rig, "this computer"), None, Box::new(|_| ()));
+        let result = with_firmware(&table, |target| {
+            let mut machine = Simulated::new(&rig, &table, None, target, 2).unwrap();
+            let steps = &CommissionStep::EARLY[..4];
+            Commissioning::new(plan(&of_file, &table, "")).run(&mut machine, &mut journal, steps)
+        });
+        result.unwrap().is_ok()
+    };
+    assert!(home(new) && !home(&rig));
+    let output = upright(&["commission", &path_of(SINGLE), "--target", "host", "--zeros"]);
+    assert!(status(&output) == 2 && stderr(&output).contains("no link has an absolute sensor"));
+}
+
+/// A machine whose links never hang still.
+struct Restless<'a>(Simulated<'a>);
+
+impl MachineAtHand for Restless<'_> {
+    fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
+        self.0.exchange(bytes)
+    }
+    fn now(&self) -> std::time::Duration {
+        self.0.now()
+    }
+    fn ask(&mut self, _: PersonTask) -> Result<(), Stop> {
+        self.0.ask(PersonTask::Move(1))
+    }
+    fn patience(&self) -> std::time::Duration {
+        self.0.patience()
+    }
+    fn again(&mut self, failed: CommissionStep, back: CommissionStep) -> bool {
+        self.0.again(failed, back)
+    }
+}
+
+#[test]
+fn no_zero_is_measured_of_a_link_that_moves_or_a_sensor_that_does_not() {
+    let (rig, table) = rig_and_table("double-absolute");
+    let refused = |machine: &Rig, planted: Option<&str>, is_restless: bool| {
+        let planted = planted.map(|name| name.parse().unwrap());
+        let mut journal = Journal::new(CommissionRecord::new(rig, "this computer"), None, Box::new(|_| ()));
+        let text = with_zeros([9021, 12]);
+        let result = with_firmware(table, |target| {
+            let mut machine = Simulated::new(machine, table, planted, target, 1).unwrap();
+            match is_restless {
+                true => measured_zeros(plan(rig, table, &text), &mut Restless(machine), &mut journal),
+                false => measured_zeros(plan(rig, table, &text), &mut machine, &mut journal),
+            }
+        });
+        result.unwrap().err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let mut dead = rig.clone();
+    dead.chain_mut().unwrap().links[1].encoder =
+        Some(LinkEncoder::Absolute { bits: 14, zero_counts: 0, noise_rad: 0.0 });
+    for (machine, planted, is_restless, words) in [
+        (rig, None, true, "rad: let it hang still"),
+        (rig, Some("encoder-frozen"), false, "the sensor of link 1 does not count"),
+        (rig, Some("encoder-reversed"), false, "the sensor of link 1 counts the wrong way"),
+        (&dead, None, false, "the sensor of link 2 reads 0 all the time"),
+    ] {
+        let said = refused(machine, planted, is_restless);
+        assert!(said.contains(words), "{said}");
+    }
+    assert_eq!(refused(rig, None, false), "", "negative control");
 }
 
 #[test]

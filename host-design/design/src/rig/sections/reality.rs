@@ -109,6 +109,12 @@ keys! {
             "amplitude of each joint encoder's once-per-turn error", NONE;
         eccentricity_phase_rad: PerJoint, "rad", EACH_ANGLE,
             "phase of that error when the joint is straight", NONE;
+        twice_per_turn_rad: PerJoint, "rad", EACH_NOT_NEGATIVE,
+            "amplitude of each joint sensor's twice-per-turn error", NONE;
+        twice_per_turn_phase_rad: PerJoint, "rad", EACH_ANGLE,
+            "phase of that error when the joint is straight", NONE;
+        sensor_delay_s: PerJoint, "s", EACH_NOT_NEGATIVE,
+            "age of each joint sensor's reading, by its own filter and its bus", NONE;
         rail_tilt_rad: f64, "rad", Rule::SIGNED_ANGLE, "slope of the rail, positive if it rises towards +x", NONE;
     }
 }

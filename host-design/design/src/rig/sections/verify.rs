@@ -62,6 +62,12 @@ keys! {
             "amplitude of each joint encoder's once-per-turn error that the loop has to survive as the only \
              imperfection",
             NOT_REQUIRED;
+        twice_per_turn_rad: Option<f64>, "rad", Rule::ANGLE,
+            "amplitude of each joint sensor's twice-per-turn error that the loop has to survive as the only \
+             imperfection",
+            NOT_REQUIRED;
+        sensor_delay_s: Option<f64>, "s", Rule::POSITIVE,
+            "age of the joints' readings that the loop has to survive as the only imperfection", NOT_REQUIRED;
         rail_tilt_rad: Option<f64>, "rad", Rule::ANGLE,
             "slope of the rail that the loop has to survive as the only imperfection", NOT_REQUIRED;
         backlash_m: Option<f64>, "m", Rule::POSITIVE,

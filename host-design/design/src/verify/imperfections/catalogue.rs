@@ -97,7 +97,7 @@ impl Imperfection {
 const BRISTLES_RAD: [f64; 2] = [1e-3, 1e-4];
 
 /// Every imperfection that a size can be searched for.
-pub static IMPERFECTIONS: [Imperfection; 11] = [
+pub static IMPERFECTIONS: [Imperfection; 13] = [
     Imperfection {
         key: "joint_friction_n_m",
         unit: "N·m",
@@ -140,6 +140,30 @@ pub static IMPERFECTIONS: [Imperfection; 11] = [
             reality.sensors.eccentricity_rad = PerJoint::all(size);
             reality.sensors.eccentricity_phase_rad = PerJoint::all(core::f64::consts::FRAC_PI_4);
         },
+    },
+    Imperfection {
+        key: "twice_per_turn_rad",
+        unit: "rad",
+        typical: [1e-3, 1.7e-2],
+        source: "data sheets: 0.05° of an AS5048 that is linearised, to 1° of an AS5046 whose magnet is 0.7 mm off",
+        remedy: "centre the magnet over the sensor; a stronger magnet, further from iron",
+        requirement: "runs with the motor on (twice_per_turn_rad)",
+        required: |verify| verify.twice_per_turn_rad,
+        set: |reality, size| {
+            reality.sensors.twice_per_turn_rad = PerJoint::all(size);
+            // Near upright, the reading moves by less than the link.
+            reality.sensors.twice_per_turn_phase_rad = PerJoint::all(core::f64::consts::PI);
+        },
+    },
+    Imperfection {
+        key: "sensor_delay_s",
+        unit: "s",
+        typical: [1e-4, 1e-3],
+        source: "data sheets: 96 µs (AS5045, AS5046; slow 384 µs), to a filter or a slow bus (estimate)",
+        remedy: "SPI instead of I²C; a faster clock of the bus; less filter in the sensor",
+        requirement: "runs with the motor on (sensor_delay_s)",
+        required: |verify| verify.sensor_delay_s,
+        set: |reality, size| reality.sensors.sensor_delay_s = PerJoint::all(size),
     },
     Imperfection {
         key: "rail_tilt_rad",

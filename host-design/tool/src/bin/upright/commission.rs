@@ -11,8 +11,8 @@ use upright_design::identify::IdentifyError;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::commission::{
-    AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Designed, Journal, Planted,
-    Simulated,
+    AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, Planted, Simulated,
+    measured_zeros,
 };
 use upright_tool::in_the_loop::PinLink;
 use upright_tool::monitor::SerialLine;
@@ -34,7 +34,8 @@ Examples:
   upright commission rigs/single-quanser-ip02.toml --target host --write as-it-is.toml
   upright commission rigs/double-quanser-dbpen.toml --target host --defect encoders-swapped    exit status 3
   upright commission my.toml --target qemu --machine as-it-is.toml --record record.json
-  upright commission my.toml --port /dev/ttyACM0 --write as-it-is.toml --record record.json    the real machine")]
+  upright commission my.toml --port /dev/ttyACM0 --write as-it-is.toml --record record.json    the real machine
+  upright commission my.toml --port /dev/ttyACM0 --zeros --write my.toml     only the zeros of absolute sensors")]
 pub(crate) struct CommissionCommand {
     /// Rig file
     #[arg(value_name = "RIG")]
@@ -60,6 +61,9 @@ pub(crate) struct CommissionCommand {
     /// Write the rig file of the machine as identified, once its design is verified
     #[arg(long, value_name = "NEW.toml")]
     write: Option<PathBuf>,
+    /// Only measure the zeros of absolute sensors, while the links hang; --write, which may be RIG, gets them
+    #[arg(long, conflicts_with = "defect")]
+    zeros: bool,
     /// Write a record of what was asked, found and decided to this file, after each step
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -72,6 +76,10 @@ impl CommissionCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         commissionable(&rig)?;
+        if self.zeros && rig.sensors().iter().all(|sensor| sensor.absolute.is_none()) {
+            let file = self.rig.display();
+            return Err(Failure::argument(format!("{file}: no link has an absolute sensor: sensor_bits")));
+        }
         let text = std::fs::read_to_string(&self.rig)?;
         let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
         let seconds = f64::from(self.seconds);
@@ -114,8 +122,11 @@ impl CommissionCommand {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
         let mut machine = AtPort::new(SerialLine::open(port)?, lines_of_stdin(), stop, self.show());
+        if self.zeros {
+            return self.write(&measured_zeros(plan, &mut machine, journal)?);
+        }
         let designed = Commissioning::first(plan, &mut machine, journal)?;
-        self.write(&designed)?;
+        self.write(&designed.text)?;
         let new = self.write.as_deref().unwrap_or(&self.rig).display();
         journal.step(CommissionStep::Image, |journal| {
             journal.asked(format!("flash it: upright firmware flash {new}, with --board as before"));
@@ -133,11 +144,18 @@ impl CommissionCommand {
         built: &Built,
         journal: &mut Journal,
     ) -> Result<(), Failure> {
+        if self.zeros {
+            let text = built.place(self.seed).with_target(plan.table, |target| {
+                let mut machine = Simulated::new(machine, plan.table, None, target, self.seed)?;
+                measured_zeros(plan, &mut machine, journal)
+            })?;
+            return self.write(&text);
+        }
         let designed = built.place(self.seed).with_target(plan.table, |target| {
             let mut machine = Simulated::new(machine, plan.table, self.defect, target, self.seed)?;
             Commissioning::first(plan, &mut machine, journal)
         })?;
-        self.write(&designed)?;
+        self.write(&designed.text)?;
         let (rig, table) = (&designed.rig, &designed.table);
         let built = journal.step(CommissionStep::Image, |journal| {
             let built = target.built(PinLink::Files, rig, table)?;
@@ -152,10 +170,10 @@ impl CommissionCommand {
         })?)
     }
 
-    /// Writes the rig file of the machine as identified, if --write is given.
-    fn write(&self, designed: &Designed) -> Result<(), Failure> {
+    /// Writes the text of the rig file of the machine as found, if --write is given.
+    fn write(&self, text: &str) -> Result<(), Failure> {
         let Some(path) = &self.write else { return Ok(()) };
-        write_atomically(path, designed.text.as_bytes())?;
+        write_atomically(path, text.as_bytes())?;
         eprintln!("{} written", path.display());
         Ok(())
     }
