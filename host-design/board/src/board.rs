@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::angle_sensor::SensorDefect;
 use crate::bus::{Bus, Conditions, Driven, Pulse};
 use crate::chip::Chip;
 use crate::clock::{Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND};
@@ -36,6 +37,20 @@ pub enum Input {
         position: i64,
         /// Time at which the target position is reached.
         end: Time,
+    },
+    /// The reading of an absolute sensor (14 bits) in the place of an encoder, which it takes with the first reading.
+    Angle {
+        /// Index into [`BoardWiring::encoders`].
+        encoder: usize,
+        /// The reading.
+        reading: u16,
+    },
+    /// A defect of such a sensor.
+    AngleDefect {
+        /// Index into [`BoardWiring::encoders`].
+        encoder: usize,
+        /// The defect.
+        defect: SensorDefect,
     },
     /// The crystal stops oscillating.
     StopCrystal,
@@ -203,6 +218,18 @@ impl SimulatedBoard {
             }
             Input::ChipSupply(volts) => self.set_chip_supply(volts),
             Input::Encoder { encoder, position, end } => bus.turn_encoder(encoder, position, end),
+            Input::Angle { encoder, reading } => {
+                if let Some(sensor) = bus.angle_sensor(encoder)
+                    && sensor.defect != SensorDefect::Stuck
+                {
+                    sensor.reading = reading & 0x3fff;
+                }
+            }
+            Input::AngleDefect { encoder, defect } => {
+                if let Some(sensor) = bus.angle_sensor(encoder) {
+                    sensor.defect = defect;
+                }
+            }
             Input::StopCrystal => bus.stop_crystal(),
             Input::Reset(low) => self.hold(low, 0),
             Input::Halt(halted) => bus.halt(halted),

@@ -42,6 +42,7 @@
 
 #![forbid(unsafe_code)]
 
+mod angle_sensor;
 mod board;
 mod bus;
 mod chip;
@@ -60,6 +61,7 @@ mod processor;
 pub mod single_step;
 mod wiring;
 
+pub use angle_sensor::SensorDefect;
 pub use board::{Input, PowerStage, SimulatedBoard};
 pub use bus::{Conditions, Driven, Pulse};
 pub use chip::Chip;

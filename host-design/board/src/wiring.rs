@@ -22,6 +22,9 @@ pub const fn pin(letter: char, number: u8) -> Pin {
 pub struct BoardWiring {
     /// Channels A and B of each encoder.
     pub encoders: &'static [(Pin, Pin)],
+    /// Select, clock and command of absolute sensors, each of which has its data at channel A of an encoder; none in a
+    /// wiring without this bus.
+    pub angle_bus: Option<[Pin; 3]>,
     /// PWM of the power stage; channel 1 of TIM1, or its complementary output.
     pub pwm: Pin,
     /// Direction; high drives along +x.
@@ -62,6 +65,7 @@ impl BoardWiring {
     pub const fn upright() -> &'static Self {
         const WIRING: BoardWiring = BoardWiring {
             encoders: &STANDARD_ENCODERS,
+            angle_bus: Some([pin('B', 0), pin('C', 5), pin('B', 8)]),
             pwm: pin('A', 8),
             direction: pin('B', 14),
             enable: pin('B', 15),
@@ -82,6 +86,7 @@ impl BoardWiring {
     pub const fn feather() -> &'static Self {
         const WIRING: BoardWiring = BoardWiring {
             encoders: &FEATHER_ENCODERS,
+            angle_bus: None,
             pwm: pin('B', 13),
             direction: pin('B', 9),
             enable: pin('B', 14),

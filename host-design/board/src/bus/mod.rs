@@ -4,6 +4,7 @@ mod memory;
 mod registers;
 mod signals;
 
+use crate::angle_sensor::AngleSensor;
 use crate::chip::Chip;
 use crate::clock::{NEVER, Time};
 use crate::error::{Note, Rules, Stopped, Strictness, Trap, Violation};
@@ -122,6 +123,7 @@ pub(crate) struct Bus {
     pub(crate) pwm: PwmTimer,
     pub(crate) encoders: [EncoderTimer; 5],
     pub(crate) shafts: Vec<Shaft>,
+    angle_sensors: Vec<AngleSensor>,
     capture: CaptureTimer,
     pub(crate) adc: Adc,
     pub(crate) usart: Usart,
@@ -185,6 +187,7 @@ impl Bus {
             pwm: PwmTimer::new(wiring.is_complementary()),
             encoders: [true, false, false, true, false].map(EncoderTimer::new),
             shafts,
+            angle_sensors: Vec::new(),
             capture: CaptureTimer::new(),
             adc: Adc::default(),
             usart: Usart::new(),

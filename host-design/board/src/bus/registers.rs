@@ -308,6 +308,7 @@ impl Bus {
             Block::Port(i) => {
                 self.settle_output();
                 self.ports[i].write(offset, value)?;
+                self.angle_sensors_hear()?;
                 self.levels_changed();
             }
             Block::Rcc => {

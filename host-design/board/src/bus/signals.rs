@@ -1,7 +1,9 @@
 //! Signals between pins and peripherals.
 
 use super::{Bus, Driven, Pulse};
+use crate::angle_sensor::{AngleBus, AngleSensor};
 use crate::clock::Time;
+use crate::error::Violation;
 use crate::peripherals::encoder_timer::Shaft;
 use crate::peripherals::gpio::ExternalLevel;
 use crate::peripherals::rcc::Domain;
@@ -34,6 +36,34 @@ impl Bus {
         if let Some(shaft) = self.shafts.get_mut(encoder) {
             shaft.turn(position, self.now, end.max(self.now));
         }
+    }
+
+    /// The absolute sensor in the place of an encoder; connected, if it is not yet.
+    pub(crate) fn angle_sensor(&mut self, encoder: usize) -> Option<&mut AngleSensor> {
+        let data = self.wiring.encoders.get(encoder)?.0;
+        let known = self.angle_sensors.iter().position(|sensor| sensor.data == data);
+        let place = known.unwrap_or_else(|| {
+            self.angle_sensors.push(AngleSensor::new(data));
+            self.angle_sensors.len() - 1
+        });
+        self.angle_sensors.get_mut(place)
+    }
+
+    /// The absolute sensors hear the outputs, and drive their data wires.
+    pub(super) fn angle_sensors_hear(&mut self) -> Result<(), Violation> {
+        let Some(pins) = self.wiring.angle_bus.filter(|_| !self.angle_sensors.is_empty()) else {
+            return Ok(());
+        };
+        let [select, clock, command] = pins.map(|pin| self.output_level(pin));
+        for sensor in &mut self.angle_sensors {
+            let level = match sensor.hear(AngleBus { select, clock, command }, self.now)? {
+                None => ExternalLevel::Open,
+                Some(false) => ExternalLevel::Low,
+                Some(true) => ExternalLevel::High,
+            };
+            self.ports[sensor.data.port].wires[usize::from(sensor.data.number)] = level;
+        }
+        Ok(())
     }
 
     fn is_alternate(&self, pin: Pin, function: u32) -> bool {

@@ -58,6 +58,14 @@ impl BoardName {
         self.conditions(0).wiring.encoders.len()
     }
 
+    /// Whether it reads absolute sensors, of [`ANGLE_BITS`](Self::ANGLE_BITS).
+    pub fn reads_angles(self) -> bool {
+        self.conditions(0).wiring.angle_bus.is_some()
+    }
+
+    /// Bits of the absolute sensors that a board reads, AS5047D or AS5047P.
+    pub const ANGLE_BITS: u32 = 14;
+
     /// Most step pulses in a tick: its timer counts them with 8 bits.
     pub const PULSES: u32 = 256;
 

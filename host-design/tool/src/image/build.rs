@@ -62,8 +62,8 @@ pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
 /// As for [`build`].
 pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
     check_board(kind, table.sensors(), rig.tick.period_s, table.steps.as_ref())?;
-    if kind.board().is_some() {
-        counts_all(table)?;
+    if let Some(board) = kind.board() {
+        reads_all(board, table)?;
     }
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
@@ -100,6 +100,18 @@ fn check_board(
     let most = board.most_pulses_hz(tick_s);
     let rate = steps.map_or(0.0, |steps| f64::from(steps.speed_limit_m_per_s) / f64::from(steps.step_m));
     if rate > most { Err(BuildError::Pulses { board, most, rate }) } else { Ok(()) }
+}
+
+/// Checks that the board reads the absolute sensors of the table's rig, if it has any.
+fn reads_all(board: BoardName, table: &TableValues) -> Result<(), BuildError> {
+    let turns = table.limits.turn_counts.iter().zip(&table.absolute.zero_counts).zip(0..);
+    let wrong = turns.filter(|((turn, zero), _)| **zero >= 0 && **turn != 1 << BoardName::ANGLE_BITS);
+    match counts_all(table) {
+        Err(_) if board.reads_angles() => {
+            wrong.map(|(_, link)| Err(BuildError::AngleBits { board, link })).next().unwrap_or(Ok(()))
+        }
+        result => result,
+    }
 }
 
 /// Checks that the table's rig has encoders alone.

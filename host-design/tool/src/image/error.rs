@@ -33,10 +33,22 @@ pub enum BuildError {
         /// Number of the rig's sensors.
         needed: usize,
     },
-    /// A link has an absolute sensor.
+    /// A link has an absolute sensor of another kind than the board reads.
     #[error(
-        "the boards of this project read encoders, and link {link} has an absolute sensor (sensor_bits): write a board \
-         that reads it (docs/own-board.md)"
+        "{board} reads absolute sensors of {} bits, AS5047D or AS5047P, and link {link} has another sensor_bits: use \
+         such a sensor, or write a board that reads it (docs/own-board.md)",
+        BoardName::ANGLE_BITS
+    )]
+    AngleBits {
+        /// Which board.
+        board: BoardName,
+        /// The first such link, from 1.
+        link: usize,
+    },
+    /// A link has an absolute sensor, and the board reads encoders alone.
+    #[error(
+        "this board reads encoders alone, and link {link} has an absolute sensor (sensor_bits): use another board \
+         (docs/board.md), or write one that reads it (docs/own-board.md)"
     )]
     AbsoluteSensor {
         /// The first such link, from 1.

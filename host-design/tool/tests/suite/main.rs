@@ -1,5 +1,6 @@
 //! Tests of the command line and of the modules behind it. One program, so that linking happens once.
 
+mod angles_on_board;
 mod board_layer;
 mod campaign;
 mod command;

@@ -30,6 +30,9 @@ fn connected_to(signal: Signal) -> String {
         Signal::LimitLow => "limit switch, low end: opens when pressed".to_owned(),
         Signal::LimitHigh => "limit switch, high end: opens when pressed".to_owned(),
         Signal::Supply => "supply voltage through 22 kΩ; 1 kΩ to ground".to_owned(),
+        Signal::AngleSelect => "absolute sensors, select (CSn)".to_owned(),
+        Signal::AngleClock => "absolute sensors, clock (CLK)".to_owned(),
+        Signal::AngleCommand => "absolute sensors, command (MOSI)".to_owned(),
         Signal::Transmit => "serial line to the host".to_owned(),
         Signal::Receive => "serial line from the host".to_owned(),
         Signal::Tick => "oscilloscope: high while a tick runs".to_owned(),
@@ -41,9 +44,10 @@ fn pin(wire: &Wire) -> String {
     format!("P{}{}", char::from(wire.port), wire.pin)
 }
 
-fn row(wire: &Wire) -> String {
+fn row(wire: &Wire, has_bus: bool) -> String {
     let pull_up = if wire.pull_up { "pull-up" } else { "" };
-    format!("| {} | {} | {} | {pull_up} |", pin(wire), wire.function, connected_to(wire.signal))
+    let data = if has_bus && matches!(wire.signal, Signal::Encoder(1.., b'A')) { "; or MISO" } else { "" };
+    format!("| {} | {} | {}{data} | {pull_up} |", pin(wire), wire.function, connected_to(wire.signal))
 }
 
 fn board_row(board: &BoardData) -> String {
@@ -79,7 +83,8 @@ fn documented<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
 }
 
 fn defined(wiring: &[Wire]) -> Vec<String> {
-    wiring.iter().map(row).collect()
+    let has_bus = wiring.iter().any(|wire| matches!(wire.signal, Signal::AngleSelect));
+    wiring.iter().map(|wire| row(wire, has_bus)).collect()
 }
 
 #[test]

@@ -6,6 +6,7 @@ use upright::gains::SENSORS;
 
 use super::boards::BOARD;
 use super::motor::GIVES_PULSES;
+use super::sensors::is_absolute;
 use super::wiring::{Signal, encoders, wire_of};
 
 /// The timers in use, cart first, then the links from the lowest up.
@@ -27,13 +28,18 @@ const TIMERS: [(*const u32, CounterWidth); SENSORS] = {
     timers
 };
 
-/// Address of a sensor's counter register, if the sensor is in use: the cart's is not, where pulses move it.
+/// Address of a sensor's counter register, if the sensor is in use: the cart's is not, where pulses move it; nor
+/// is that of an absolute sensor.
 const fn counter(sensor: usize) -> Option<*const u32> {
-    if sensor < SENSORS && !(GIVES_PULSES && sensor == 0) {
+    if sensor < SENSORS && !is_no_counter(sensor) {
         Some(TIMERS[sensor].0.wrapping_byte_add(CNT))
     } else {
         None
     }
+}
+
+const fn is_no_counter(sensor: usize) -> bool {
+    is_absolute(sensor) || GIVES_PULSES && sensor == 0
 }
 
 /// Widths of the counters in use.
@@ -41,7 +47,7 @@ pub(super) const WIDTHS: [CounterWidth; SENSORS] = {
     let mut widths = [Bits16; SENSORS];
     let mut i = 0;
     while i < SENSORS {
-        widths[i] = if GIVES_PULSES && i == 0 { Bits32 } else { TIMERS[i].1 };
+        widths[i] = if is_no_counter(i) { Bits32 } else { TIMERS[i].1 };
         i += 1;
     }
     widths

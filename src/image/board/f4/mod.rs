@@ -1,5 +1,6 @@
 //! Boards with an STM32F405, STM32F407 or STM32F446.
 
+mod angles;
 mod boards;
 mod clock;
 mod crash;
@@ -8,6 +9,7 @@ mod guard;
 mod memory;
 mod motor;
 mod pins;
+mod sensors;
 mod serial;
 mod steps;
 mod supply;
@@ -18,15 +20,17 @@ mod wiring;
 use crate::pac::{EXTI, PWR, Peripherals};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
-use upright::board::{Board, Contacts, Inputs, Output};
+use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::gains::SENSORS;
 use upright::protocol::message::Start;
 
+use angles::Angles;
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
 pub(crate) use memory::MemoryCheck;
 use motor::{GIVES_PULSES, Motor};
+use sensors::ANY_IS_ABSOLUTE;
 pub(crate) use serial::{DmaBuffer, DmaLine};
 use steps::Steps;
 use supply::Supply;
@@ -38,6 +42,8 @@ pub(crate) struct F4Board {
     motor: Motor,
     /// One, if the drive takes pulses.
     steps: [Steps; GIVES_PULSES as usize],
+    /// One, if the rig has absolute sensors.
+    angles: [Angles; ANY_IS_ABSOLUTE as usize],
     supply: Supply,
     exti: EXTI,
     power: PWR,
@@ -51,7 +57,7 @@ pub(crate) struct F4Board {
     limits: [bool; 2],
 }
 
-/// Sets up all peripherals but the watchdog, with the motor off. Takes at most 150 ms, even if a peripheral does not
+/// Sets up all peripherals but the watchdog, with the motor off. Takes at most 300 ms, even if a peripheral does not
 /// respond. Also returns what the board knows about the start.
 pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4Board, DmaLine, Start) {
     let rcc = &device.RCC;
@@ -72,11 +78,14 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
     core.DWT.enable_cycle_counter();
     let wrong_chip = !guard::chip_is_right(&device.DBGMCU);
     pins::set_status_led(clock == Clock::Full && !wrong_chip && !motor.has_failed());
+    let angles: [Angles; ANY_IS_ABSOLUTE as usize] = core::array::from_fn(|_| Angles::new());
+    angles.iter().for_each(Angles::set_up);
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     let hardware = F4Board {
         motor,
         steps: [const { Steps::new() }; GIVES_PULSES as usize],
+        angles,
         supply,
         exti: device.EXTI,
         power: device.PWR,
@@ -110,6 +119,9 @@ impl Board<SENSORS> for F4Board {
         if let ([steps], [pulses, ..]) = (self.steps.as_mut_slice(), raw_counts.as_mut_slice()) {
             (*pulses, is_late) = (steps.given(), steps.was_late());
         }
+        if let [angles] = self.angles.as_mut_slice() {
+            angles.read(&mut raw_counts);
+        }
         // Clears the flag of the current tick.
         let _ = tick_is_due();
         let [limit_low, limit_high] = pins::limits();
@@ -131,6 +143,10 @@ impl Board<SENSORS> for F4Board {
                     | guard::supply_was_low(&self.power, &self.exti),
             },
         }
+    }
+
+    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+        self.angles.first_mut().map(|angles| &mut angles.bad)
     }
 
     fn tick_s(&self) -> f32 {

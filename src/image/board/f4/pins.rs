@@ -3,6 +3,7 @@
 use crate::pac::{EXTI, SYSCFG};
 
 use super::boards::BOARD;
+use super::sensors;
 use super::wiring::{PinMode, Signal, Wire, wire_of};
 
 const DIRECTION: Wire = wire_of(BOARD.wiring, Signal::Direction);
@@ -31,18 +32,22 @@ const SET_UP: [PortSettings; PORTS] = {
     let mut i = 0;
     while i <= BOARD.wiring.len() {
         let wire = if i < BOARD.wiring.len() { BOARD.wiring[i] } else { BOARD.status_led };
+        let Some(mode) = sensors::mode(wire) else {
+            i += 1;
+            continue;
+        };
         let port = &mut ports[(wire.port - b'A') as usize];
         let (at, half) = (2 * wire.pin, (wire.pin / 8) as usize);
         assert!(port.two_bits & (3 << at) == 0, "a pin is used twice");
         port.two_bits |= 3 << at;
-        port.mode |= match wire.mode {
+        port.mode |= match mode {
             PinMode::Input => 0,
             PinMode::Output => 1,
             PinMode::Alternate(_) => 2,
             PinMode::Analog => 3,
         } << at;
         port.pull |= (wire.pull_up as u32) << at;
-        if let PinMode::Alternate(number) = wire.mode {
+        if let PinMode::Alternate(number) = mode {
             port.alternate[half] |= (number as u32) << (4 * (wire.pin % 8));
             port.four_bits[half] |= 15 << (4 * (wire.pin % 8));
         }
@@ -78,7 +83,7 @@ pub(super) fn set_up(syscfg: &SYSCFG, exti: &EXTI) {
 }
 
 /// Level of an input; true is high.
-fn is_high(wire: Wire) -> bool {
+pub(super) fn is_high(wire: Wire) -> bool {
     // SAFETY: reading the input register (8.4.5) has no side effect.
     unsafe { ((wire.port_base() + 0x10) as *const u32).read_volatile() & 1 << wire.pin != 0 }
 }
@@ -129,7 +134,8 @@ pub(super) fn set_status_led(on: bool) {
     set(BOARD.status_led, on != BOARD.status_led_is_low);
 }
 
-fn set(wire: Wire, high: bool) {
+/// Sets an output.
+pub(super) fn set(wire: Wire, high: bool) {
     let bit = u32::from(wire.pin) + if high { 0 } else { 16 };
     // SAFETY: the bit set and reset register changes this output at once, and nothing else (8.4.7).
     unsafe { ((wire.port_base() + 0x18) as *mut u32).write_volatile(1 << bit) };

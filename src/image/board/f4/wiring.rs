@@ -51,6 +51,12 @@ pub(crate) enum Signal {
     LimitLow,
     /// The limit switch at the high end of the rail: opens when pressed.
     LimitHigh,
+    /// Select of the absolute sensors: low during a frame.
+    AngleSelect,
+    /// Clock of the absolute sensors.
+    AngleClock,
+    /// Commands to the absolute sensors.
+    AngleCommand,
     /// The supply voltage of the power stage, through a divider.
     Supply,
     /// Serial line to the host.
@@ -79,6 +85,9 @@ impl Signal {
             Signal::Receive => 9,
             Signal::Tick => 10,
             Signal::StatusLed => 11,
+            Signal::AngleSelect => 12,
+            Signal::AngleClock => 13,
+            Signal::AngleCommand => 14,
             Signal::Encoder(sensor, channel) => 16 + 2 * sensor + (channel - b'A'),
         }
     }
@@ -99,7 +108,7 @@ pub(crate) enum PinMode {
 
 /// The wiring of all boards that leave these pins free: the pins exist on the 64-pin packages of STM32F405, STM32F407
 /// and STM32F446, with the same functions. The status LED differs from board to board.
-pub(crate) const STANDARD: [Wire; 21] = [
+pub(crate) const STANDARD: [Wire; 24] = [
     encoder(0, b'A', b'A', 15, 1, "TIM2_CH1"),
     encoder(0, b'B', b'B', 3, 1, "TIM2_CH2"),
     encoder(1, b'A', b'A', 0, 2, "TIM5_CH1"),
@@ -121,6 +130,9 @@ pub(crate) const STANDARD: [Wire; 21] = [
     wire(Signal::Transmit, b'A', 2, PinMode::Alternate(7), false, "USART2_TX"),
     wire(Signal::Receive, b'A', 3, PinMode::Alternate(7), true, "USART2_RX"),
     output(Signal::Tick, b'B', 1),
+    output(Signal::AngleSelect, b'B', 0),
+    output(Signal::AngleClock, b'C', 5),
+    output(Signal::AngleCommand, b'B', 8),
 ];
 
 /// Number of encoders that a board can count.

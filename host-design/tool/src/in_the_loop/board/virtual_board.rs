@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
+use upright::control::encoder::AbsoluteSensor;
 use upright::protocol::simulated_pins::InjectedFault;
 use upright::protocol::{BAUD, telemetry_ticks};
 use upright_board::{
@@ -28,6 +29,8 @@ const QUIET: Time = 60 * UNITS_PER_MICROSECOND;
 const START_S: f64 = 1.0;
 /// An unmapped address: executing it is a processor fault.
 const NOWHERE: u32 = 0x3000_0000;
+/// Bits of an absolute sensor.
+const BITS: u32 = 14;
 /// Lowest address of the stack (memory.x).
 const STACK_END: u32 = 0x2000_0000;
 /// Exception number of SysTick.
@@ -80,6 +83,8 @@ pub struct VirtualBoard {
     /// Position of each encoder (edges).
     positions: Vec<i64>,
     counters: Option<Vec<u32>>,
+    /// What the image makes of the readings of each absolute sensor.
+    angles: Vec<Option<AbsoluteSensor>>,
     contacts: Option<Contacts>,
     supply_v: Option<f32>,
     outgoing: VecDeque<u8>,
@@ -117,6 +122,8 @@ impl VirtualBoard {
         let mut board =
             SimulatedBoard::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
+        let is_absolute = table.absolute.zero_counts.iter().map(|&zero| zero >= 0);
+        let angles = is_absolute.map(|is| is.then(|| AbsoluteSensor::new(BITS)));
         let pulses = table.steps.map(|_| PulseCount::default());
         if pulses.is_some() {
             board.record_pulses();
@@ -129,6 +136,7 @@ impl VirtualBoard {
             tick_s: f64::from(table.tick_s),
             positions: vec![0; table.sensors()],
             counters: None,
+            angles: angles.collect(),
             contacts: None,
             supply_v: None,
             outgoing: VecDeque::new(),
@@ -141,6 +149,9 @@ impl VirtualBoard {
             image: image.clone(),
             meter: None,
         };
+        // Sensors that read 0, until the first tick.
+        target.turn(&vec![0; table.sensors()]);
+        target.counters = None;
         target.connect(&Contacts::default());
         target.supply(table.motor.map_or(24.0, |motor| motor.supply_v));
         at_power_up.iter().for_each(|&input| target.board.apply(input));
@@ -245,11 +256,22 @@ impl VirtualBoard {
 
     /// Turns the shafts to the positions of the counters, at once, since the image reads them only in a tick.
     fn turn(&mut self, counts: &[u32]) {
+        for (encoder, (angle, &count)) in self.angles.iter_mut().zip(counts).enumerate() {
+            let Some(angle) = angle else { continue };
+            let reading = count as u16 & ((1 << BITS) - 1);
+            self.board.apply(Input::Angle { encoder, reading });
+            if let Some(position) = self.positions.get_mut(encoder) {
+                *position = i64::from(angle.count(reading.into()) as i32);
+            }
+        }
         let before = self.counters.replace(counts.to_vec()).unwrap_or_else(|| counts.to_vec());
         let end = self.board.now();
         for (encoder, ((&count, &before), position)) in
             counts.iter().zip(&before).zip(&mut self.positions).enumerate()
         {
+            if self.angles.get(encoder).is_some_and(Option::is_some) {
+                continue;
+            }
             let moved = count.wrapping_sub(before);
             *position += Bench::signed(encoder, moved);
             if moved != 0 {

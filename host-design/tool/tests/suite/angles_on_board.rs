@@ -1,0 +1,159 @@
+//! Absolute sensors on the virtual board: the flashed image reads them over their bus, and has the bits of the host.
+
+use upright::protocol::message::{Answer, Request};
+use upright::supervision::fault::Fault;
+use upright::table::Law;
+use upright_board::{Conditions, Image, Input, SensorDefect};
+use upright_design::design::design;
+use upright_design::harness::{Harness, Recording, record};
+use upright_design::rig::{LinkEncoder, Rig};
+use upright_design::simulate::Scenario;
+use upright_design::swing_up::{hangs, up_and_down};
+use upright_design::table::{Gains, TableValues};
+use upright_design::verify::at_rest_disturbed;
+use upright_tool::image::{BoardName, ImageKind, build_for};
+use upright_tool::in_the_loop::{Event, VirtualBoard, measure, run_compared};
+
+use crate::equipment::built_for;
+use crate::published::{rig_and_table, rig_and_table_with_motions};
+
+/// Readings while the links hang: the first link wraps on its way up, and all of them near upright or hanging.
+const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
+
+/// A rig of `rigs/` with absolute sensors of this many bits, and its table.
+fn absolute(name: &'static str, bits: u8, noise_rad: f64) -> (Rig, TableValues) {
+    let mut rig = rig_and_table(name).0.clone();
+    for (link, zero_counts) in rig.chain_mut().unwrap().links.iter_mut().zip(ZEROS) {
+        link.encoder = Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad });
+    }
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    (rig, table)
+}
+
+fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
+    let elf = built_for(ImageKind::Board(BoardName::WeactF405), rig, table)?;
+    Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
+}
+
+#[test]
+fn the_image_balances_with_absolute_sensors_with_the_bits_of_the_host() {
+    for (name, noise_rad) in
+        [("double-quanser-dbpen", 2e-4), ("triple-glueck-eder-kugi", 1e-4), ("quadruple-paper", 2e-5)]
+    {
+        let (rig, table) = absolute(name, 14, noise_rad);
+        let Some(image) = image(&rig, &table) else { return };
+        let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+        let scenario = Scenario { duration_s: 2.0, ..Scenario::at_rest(&rig, Law::Lqr) };
+        let (recording, [ticks, messages]): (Recording, _) =
+            run_compared(&rig, &table, &scenario, &mut board).unwrap();
+        assert!(recording.fault.is_none() && recording.summary.survives(), "{name}: {:?}", recording.fault);
+        assert!(messages > 100, "{name}: {ticks} {messages}");
+
+        // Negative control: a sensor that is off by one reading on the board.
+        let mut other = table.clone();
+        other.absolute.zero_counts[1] += 1;
+        let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+        let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
+        assert!(error.contains("differ"), "{error}");
+
+        // Reading takes the same time in every tick, whatever the sensors say.
+        let cycles = measure(&rig, &table, &scenario, &image, &Conditions::f405(1)).unwrap();
+        println!("{name}: inputs {:?}, whole {:?}", cycles.all.inputs, cycles.all.whole);
+        assert!(cycles.all.inputs.us < 32.0 && cycles.check().is_ok(), "{:?}", cycles.all.inputs);
+        let [off, balancing] = [cycles.off, cycles.balancing].map(|ticks| ticks.unwrap().inputs.cycles);
+        assert!(off.abs_diff(balancing) < 100, "{off} {balancing}");
+    }
+}
+
+#[test]
+fn the_image_raises_and_lowers_links_with_absolute_sensors() {
+    for name in ["single-absolute", "double-absolute"] {
+        let (rig, table) = rig_and_table_with_motions(name);
+        let Some(image) = image(rig, table) else { return };
+        let mut board = VirtualBoard::start(&image, &Conditions::f405(1), table).unwrap();
+        let recording = record(rig, table, &up_and_down(rig, table, 0.5).unwrap(), &mut board).unwrap();
+        assert!(hangs(&recording), "{name}: {:?}", recording.fault);
+    }
+}
+
+/// The fault of a rig whose first sensor gets this defect in its 100th tick of balancing: the fault, its sensor, ticks
+/// from the onset to motor off, and measurements rejected; of 1000 ticks.
+fn with_defect(
+    (rig, table): &(Rig, TableValues),
+    image: &Image,
+    defect: impl Fn(usize) -> SensorDefect,
+) -> (Option<(Fault, Option<u8>)>, usize, u32) {
+    let mut board = VirtualBoard::start(image, &Conditions::f405(1), table).unwrap();
+    let events = board.events();
+    let mut harness = Harness::new(rig, table, &at_rest_disturbed(rig, Law::Lqr, 1), &mut board).unwrap();
+    let output = harness.raise(None).unwrap();
+    harness.bench.tick(output.drive);
+    let mut off = None;
+    for tick in 0..1000 {
+        if tick >= 100 {
+            let input = Input::AngleDefect { encoder: 1, defect: defect(tick - 100) };
+            events.borrow_mut().push(Event::Input { after: 0, input });
+        }
+        let inputs = harness.inputs();
+        let output = harness.session.tick(&inputs).unwrap();
+        harness.bench.tick(output.drive);
+        if tick >= 100 && !output.enable {
+            off = off.or(Some(tick - 99));
+            if off.is_some() {
+                break;
+            }
+        }
+    }
+    let inputs = harness.inputs();
+    let Ok(Answer::Cause(cause)) = harness.session.ask(Request::Cause, &inputs) else { panic!("no cause") };
+    let Ok(Answer::Statistics(statistics)) = harness.session.ask(Request::Statistics, &inputs) else {
+        panic!("no statistics")
+    };
+    (cause.map(|cause| (cause.fault, cause.sensor)), off.unwrap_or(0), statistics.rejected_samples)
+}
+
+#[test]
+fn defects_of_an_absolute_sensor_are_found_or_survived() {
+    for (name, noise_rad) in [("single-quanser-ip02", 4e-4), ("quadruple-paper", 2e-5)] {
+        let rig = absolute(name, 14, noise_rad);
+        let Some(image) = image(&rig.0, &rig.1) else { return };
+        for (what, defect) in [
+            ("wire open", SensorDefect::WireOpen),
+            ("wire grounded", SensorDefect::WireGrounded),
+            ("no magnet", SensorDefect::NoMagnet),
+            ("one wrong bit", SensorDefect::FlippedBits(1 << 9)),
+            ("three wrong bits", SensorDefect::FlippedBits(7 << 5)),
+        ] {
+            let found = with_defect(&rig, &image, |_| defect);
+            println!("{name}, {what}: {found:?}");
+            assert_eq!((found.0, found.1), (Some((Fault::Encoder, Some(1))), 3), "{name} {what}");
+        }
+        let odd = |tick: usize| match tick % 4 {
+            0 | 1 => SensorDefect::FlippedBits(1 << 9),
+            _ => SensorDefect::None,
+        };
+        let survived = with_defect(&rig, &image, odd);
+        println!("{name}, two of four with a wrong bit: {survived:?}");
+        assert_eq!(survived.0, None, "{name}");
+        // Parity does not find two wrong bits, but the observer does; a sensor that is stuck stands still.
+        for (what, defect) in
+            [("two wrong bits", SensorDefect::FlippedBits(3 << 9)), ("stuck", SensorDefect::Stuck)]
+        {
+            let found = with_defect(&rig, &image, |_| defect);
+            println!("{name}, {what}: {found:?}");
+            assert!(found.0.is_some(), "{name} {what}");
+        }
+    }
+}
+
+#[test]
+fn an_image_is_refused_for_a_board_or_a_sensor_that_do_not_fit() {
+    let refused = |board, bits| {
+        let (rig, table) = absolute("single-quanser-ip02", bits, 1e-3);
+        build_for(ImageKind::Board(board), &rig, &table).unwrap_err().to_string()
+    };
+    let bits = refused(BoardName::WeactF405, 12);
+    assert!(bits.contains("link 1") && bits.contains("14 bits") && bits.contains("own-board.md"), "{bits}");
+    let feather = refused(BoardName::FeatherF405, 14);
+    assert!(feather.contains("link 1") && feather.contains("another board"), "{feather}");
+}

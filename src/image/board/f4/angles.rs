@@ -1,0 +1,139 @@
+//! Absolute sensors of the links: AS5047D or AS5047P, on one bus (SPI mode 1), all read at once.
+//!
+//! Clock, select and command are the same for all of them; each has its data line, at the pin that is channel A of an
+//! encoder's. The time of a tick does not depend on how many they are, or what they answer.
+//!
+//! A sensor answers the last command with the next frame. A tick asks for the angle, and gets its own state, which it
+//! was asked for at the end of the tick before; then it gets the angle. Parity finds an odd number of wrong bits; a
+//! wire at 3.3 V is an error flag; a wire at 0 V is a sensor that says that it is not ready.
+
+use cortex_m::asm;
+use upright::board::BadSamples;
+use upright::control::encoder::AbsoluteSensor;
+use upright::gains::SENSORS;
+
+use super::boards::BOARD;
+use super::pins;
+use super::sensors::{ANY_IS_ABSOLUTE, BITS, is_absolute};
+use super::wiring::{Signal, Wire, wire_of};
+
+/// In every answer: the sensor has found an error in a command. It stays until the errors are read.
+const ERROR_FLAG: u16 = 1 << 14;
+
+// Commands to read a register, with even parity (datasheet, SPI frames and volatile registers).
+const READ_ANGLE: u16 = 0xffff;
+const READ_STATE: u16 = 0xfffc;
+const READ_ERRORS: u16 = 0x4001;
+
+/// Of the state (DIAAGC): the magnet is missing or too far, the angle is not computed, the sensor is ready.
+const MAGNET_LOW: u16 = 1 << 11;
+const OVERFLOW: u16 = 1 << 9;
+const READY: u16 = 1 << 8;
+
+/// Half a period of the clock: the sensor needs 50 ns, and 51 ns for its data.
+const HALF: u32 = delay(50);
+/// Time between select and clock, and between two frames.
+const PAUSE: u32 = delay(350);
+/// Time until a sensor is ready that was powered on with the microcontroller: it needs 10 ms.
+const START: u32 = delay(12_000_000);
+
+/// What [`asm::delay`] needs for at least this time (ns): it counts two cycles for a turn of its loop, which takes
+/// three.
+const fn delay(ns: u64) -> u32 {
+    (ns * super::CLOCK_HZ as u64 / 1_000_000_000 * 2 / 3) as u32 + 1
+}
+
+const SELECT: Wire = bus(Signal::AngleSelect);
+const CLOCK: Wire = bus(Signal::AngleClock);
+const COMMAND: Wire = bus(Signal::AngleCommand);
+
+/// A wire of the bus; any wire, in an image that has no bus.
+const fn bus(signal: Signal) -> Wire {
+    wire_of(BOARD.wiring, if ANY_IS_ABSOLUTE { signal } else { Signal::Tick })
+}
+
+/// The absolute sensors.
+pub(super) struct Angles {
+    sensors: [AbsoluteSensor; SENSORS],
+    /// What the next frame answers.
+    asked: u16,
+    pub(super) bad: BadSamples,
+}
+
+impl Angles {
+    /// The sensors before [`set_up`](Self::set_up).
+    pub(super) fn new() -> Self {
+        let sensors = [const { AbsoluteSensor::new(BITS) }; SENSORS];
+        Self { sensors, asked: READ_STATE, bad: BadSamples::default() }
+    }
+
+    /// Waits until the sensors are ready, and asks them for their state.
+    pub(super) fn set_up(&self) {
+        pins::set(SELECT, true);
+        asm::delay(START);
+        // What happened on the bus before the pins were set up is an error that is to be forgotten.
+        transfer(READ_ERRORS);
+        transfer(self.asked);
+    }
+
+    /// Reads all sensors into `raw_counts`; the counts of bad samples are not changed.
+    pub(super) fn read(&mut self, raw_counts: &mut [u32; SENSORS]) {
+        let states = transfer(READ_ANGLE);
+        let was_state = self.asked == READ_STATE;
+        let has_error =
+            states.iter().zip(0..).any(|(&state, sensor)| is_absolute(sensor) && !is_sound(state));
+        self.asked = if was_state && has_error { READ_ERRORS } else { READ_STATE };
+        let answers = transfer(self.asked).into_iter().zip(states);
+        for (number, ((count, sensor), (angle, state))) in
+            raw_counts.iter_mut().zip(&mut self.sensors).zip(answers).enumerate()
+        {
+            if !is_absolute(number) {
+                continue;
+            }
+            let is_ready = state & (READY | OVERFLOW | MAGNET_LOW) == READY;
+            if is_sound(angle) && (!was_state || is_sound(state) && is_ready) {
+                *count = sensor.count((angle & ((1 << BITS) - 1)).into());
+            } else {
+                self.bad.now |= 1 << number;
+            }
+        }
+    }
+}
+
+/// Whether a frame has even parity and no error flag.
+fn is_sound(frame: u16) -> bool {
+    frame.count_ones().is_multiple_of(2) && frame & ERROR_FLAG == 0
+}
+
+/// Sends a command to all sensors, and returns their answers to the one before.
+#[inline(never)]
+fn transfer(command: u16) -> [u16; SENSORS] {
+    let mut answers = [0; SENSORS];
+    pins::set(SELECT, false);
+    asm::delay(PAUSE);
+    for bit in (0..16).rev() {
+        pins::set(COMMAND, command & 1 << bit != 0);
+        // Both sides change their bit with the rising edge, and take the other's with the falling one.
+        pins::set(CLOCK, true);
+        asm::delay(HALF);
+        pins::set(CLOCK, false);
+        asm::delay(HALF);
+        macro_rules! take {
+            ($($sensor:literal)*) => {
+                $(if let (Some(answer), Some(data)) = (answers.get_mut($sensor), const { data($sensor) }) {
+                    *answer = *answer << 1 | u16::from(pins::is_high(data));
+                })*
+            };
+        }
+        take!(1 2 3 4);
+    }
+    asm::delay(PAUSE);
+    pins::set(SELECT, true);
+    asm::delay(PAUSE);
+    answers
+}
+
+/// The data line of a sensor, if it is absolute.
+const fn data(sensor: usize) -> Option<Wire> {
+    if is_absolute(sensor) { Some(wire_of(BOARD.wiring, Signal::Encoder(sensor as u8, b'A'))) } else { None }
+}
