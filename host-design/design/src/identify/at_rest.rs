@@ -2,11 +2,11 @@
 
 use super::model::Model;
 use super::prediction::Filter;
-use super::stribeck;
+use super::stribeck::HALF_AT;
 
 /// Excesses that are tried, as shares of the friction in motion.
 const EXCESSES: [f64; 5] = [0.0, 0.15, 0.3, 0.45, 0.6];
-/// Factors on the usual speed at which half of the cart's excess is left.
+/// Factors on the usual speeds at which half of the excess is left, of the cart and of the joints.
 const FACTORS: [f64; 5] = [0.45, 0.67, 1.0, 1.5, 2.25];
 /// Duration of the part of the record on which they are tried (s).
 const TRIAL_S: f64 = 20.0;
@@ -14,19 +14,22 @@ const TRIAL_S: f64 = 20.0;
 const ITERATIONS: usize = 2;
 /// Least fall of -2 ln L with which an excess is believed.
 const LEAST_GAIN: f64 = 12.0;
+/// -2 ln L of an excess that cannot be ruled out is at most this above that of the likeliest (95 % of χ²).
+const NOT_RULED_OUT: f64 = 3.84;
 
-/// Indices in [`EXCESSES`] of the cart and of the joints, and in [`FACTORS`].
-type ExcessIndices = [usize; 3];
+/// Indices in [`EXCESSES`] of the cart and of the joints, and in [`FACTORS`] of both.
+type ExcessIndices = [usize; 4];
 /// No excess.
-const NONE: ExcessIndices = [0, 0, 2];
+const NONE: ExcessIndices = [0, 0, 2, 2];
 
 /// The model with the excesses of the cart's and the joints' friction at rest under which the measurements are most
-/// likely, and the cart's speed at which half of its excess is left; without excess, unless the record shows otherwise.
+/// likely, and the speeds at which half of them is left; without excess, unless the record shows otherwise.
+/// Small joints often hide theirs: the largest excess of the joints that the record does not rule out is kept, too.
 pub(super) fn with_excess(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Model {
     let short = filter.record.part(0.0, TRIAL_S);
-    let model = |[cart, joints, speed]: ExcessIndices| Model {
+    let model = |[cart, joints, speed, rate]: ExcessIndices| Model {
         excess: [EXCESSES[cart], EXCESSES[joints]],
-        half_at: FACTORS[speed] * stribeck::SPEED,
+        half_at: [FACTORS[speed] * HALF_AT[0], FACTORS[rate] * HALF_AT[1]],
         ..filter.model.clone()
     };
     let cost = |at: ExcessIndices| {
@@ -53,9 +56,14 @@ pub(super) fn with_excess(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Mode
     };
     let found = [0, 1, 0].into_iter().fold((NONE, own), improved);
     let is_believed = own - found.1 > LEAST_GAIN;
-    match (is_believed, found.0) {
-        (false, _) => model(NONE),
-        (true, [0, ..]) => model(found.0),
-        (true, _) => model([2, 0, 2, 1].into_iter().fold(found, improved).0),
-    }
+    // Without an excess, its speed changes nothing.
+    let has_excess = |at: ExcessIndices, index: usize| index < 2 || at[index - 2] > 0;
+    let found = [2, 0, 2, 1, 3, 1].into_iter().fold(found, |found, index| {
+        if is_believed && has_excess(found.0, index) { improved(found, index) } else { found }
+    });
+    let ([cart, joints, speed, rate], least) = found;
+    let is_possible = |joints: &usize| cost([cart, *joints, speed, rate]) < least + NOT_RULED_OUT;
+    let at_most = (joints + 1..EXCESSES.len()).take_while(is_possible).last().unwrap_or(joints);
+    let used = if is_believed { found.0 } else { NONE };
+    Model { joints_excess_at_most: EXCESSES[at_most], ..model(used) }
 }

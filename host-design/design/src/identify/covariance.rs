@@ -1,6 +1,7 @@
 //! Standard deviations of the estimates: those of the prediction-error fit, widened by how much other modelling
 //! choices change the estimates.
 
+use super::model::Model;
 use super::parameters::{ParameterKind, Prior};
 use super::prediction::Filter;
 use super::record::Record;
@@ -73,6 +74,12 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
         for (excess, factor) in model.excess.iter_mut().zip(factors) {
             *excess = if *excess > 0.0 { factor * *excess } else { UNSEEN_EXCESS };
         }
+        let other = Filter { model: &model, ..*filter };
+        widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
+    }
+    let [cart, joints] = filter.model.excess;
+    if filter.model.joints_excess_at_most > joints {
+        let model = Model { excess: [cart, filter.model.joints_excess_at_most], ..filter.model.clone() };
         let other = Filter { model: &model, ..*filter };
         widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
     }

@@ -56,7 +56,7 @@ impl Model {
     /// Dry friction of the cart at the speed `v` (m/s) with the deflection `bristle`, as a share of that in motion, and
     /// its derivatives by speed and deflection.
     pub(super) fn cart_friction(&self, v: f64, bristle: f64) -> [f64; 3] {
-        let [factor, by_speed] = stribeck::factor(self.excess[0], self.half_at, v);
+        let [factor, by_speed] = stribeck::factor(self.excess[0], self.half_at[0], v);
         let Some(creeping) = self.creeping else { return [factor * bristle, by_speed * bristle, factor] };
         let direction = libm::tanh(v / creeping);
         let slope = (1.0 - direction * direction) / creeping;

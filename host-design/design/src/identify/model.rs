@@ -42,8 +42,10 @@ pub(super) struct Model {
     /// Excess of the friction at rest of the cart and of the joints, as a share of the friction in motion; not of
     /// joints that have a bristle.
     pub(super) excess: [f64; 2],
-    /// Speed of the cart at which half of its excess is left (m/s).
-    pub(super) half_at: f64,
+    /// The largest excess of the joints that the record does not rule out.
+    pub(super) joints_excess_at_most: f64,
+    /// Speed of the cart (m/s) and rate of the joints (rad/s) at which half of the excess is left.
+    pub(super) half_at: [f64; 2],
     /// Whether the cart's motion is imposed, by a drive or by a clamp.
     pub(super) is_imposed: bool,
     /// Parts of an integration step.
@@ -106,7 +108,7 @@ impl Model {
             let bristle = at[2 * self.coordinates() + 1 + joint];
             return [viscous * rate + dry * bristle, viscous, bristle];
         }
-        let [factor, by_rate] = stribeck::factor(self.excess[1], stribeck::RATE, rate);
+        let [factor, by_rate] = stribeck::factor(self.excess[1], self.half_at[1], rate);
         let direction = libm::tanh(rate / smoothing);
         let slope = factor * (1.0 - direction * direction) / smoothing + by_rate * direction;
         [viscous * rate + dry * factor * direction, viscous + dry * slope, factor * direction]
@@ -366,7 +368,8 @@ pub(super) mod tests {
             smoothing: SMOOTHING,
             creeping: None,
             excess: [0.3, 0.2],
-            half_at: stribeck::SPEED,
+            joints_excess_at_most: 0.0,
+            half_at: stribeck::HALF_AT,
             is_imposed: false,
             substeps: 1,
             has_bristles: false,

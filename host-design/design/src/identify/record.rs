@@ -366,7 +366,8 @@ impl Record {
             smoothing: super::parameters::SMOOTHING,
             creeping: None,
             excess: [0.0; 2],
-            half_at: super::stribeck::SPEED,
+            joints_excess_at_most: 0.0,
+            half_at: super::stribeck::HALF_AT,
             is_imposed: self.is_clamped || self.is_moved,
             // Pulses may come in slow ticks, which are smooth steps only for a force.
             substeps: if self.is_moved { (self.dt_s / LONGEST_S).ceil() as usize } else { 1 },

@@ -1,8 +1,7 @@
 //! Dry friction that falls with the speed, from a larger one at rest (R. Stribeck, 1902).
 
 /// Speed of the cart (m/s) and rate of a joint (rad/s) at which half of the excess is left: those of `[reality]`.
-pub(super) const SPEED: f64 = 0.01;
-pub(super) const RATE: f64 = 0.1;
+pub(super) const HALF_AT: [f64; 2] = [0.01, 0.1];
 
 /// Factor of the dry friction at `speed`, with the excess at rest and the speed at which half of it is left, and its
 /// derivative by the speed.
