@@ -2,7 +2,7 @@
 
 use crate::plant::ChainParameters;
 use crate::reality::PRESLIDING_PER_DEFLECTION;
-use crate::rig::{Chain, Rig};
+use crate::rig::{Chain, LinkEncoder, Rig};
 
 /// Travel (m) over which the bristle of the cart reverses, and rate (rad/s) below which the dry friction of a joint is
 /// about proportional to the rate: δ and ε of the model.
@@ -209,6 +209,8 @@ const SHAPE: f64 = 0.5;
 const ZERO_RAD: f64 = 0.03;
 /// Deviation of the eccentricity of an encoder (rad).
 const ECCENTRICITY_RAD: f64 = 0.002;
+/// That of the magnet of an absolute sensor, which no log is identified without (rad).
+const MAGNET_RAD: f64 = 0.01;
 /// Prior deviation of a friction, as a multiple of its expected value.
 pub(super) const FRICTION: f64 = 10.0;
 
@@ -254,8 +256,13 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         }),
         ParameterKind::Travel => Prior { value: 1.0, deviation: 0.0 },
         ParameterKind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
-        ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => {
-            Prior { value: 0.0, deviation: if eccentricity { ECCENTRICITY_RAD } else { 0.0 } }
+        ParameterKind::EccentricSine(j) | ParameterKind::EccentricCosine(j) => {
+            let deviation = match chain.links[j].encoder {
+                Some(LinkEncoder::Absolute { .. }) => MAGNET_RAD,
+                _ if eccentricity => ECCENTRICITY_RAD,
+                _ => 0.0,
+            };
+            Prior { value: 0.0, deviation }
         }
     };
     layout.kinds().into_iter().map(prior).collect()

@@ -166,7 +166,7 @@ impl Filter<'_> {
         let mut step = Step::new(self.model, free);
         let mut filter = FilterState::new(self.record.state_near(p, self.model, piece, first), size);
         for channel in 0..m {
-            let step = self.record.steps[channel];
+            let step = self.record.steps[channel].hypot(self.record.noise[channel]);
             // Absolute angles are sums of measured joint angles.
             filter.covariance[channel * s + channel] = step * step * (channel as f64).max(1.0);
             filter.covariance[(m + channel) * s + m + channel] =
@@ -243,7 +243,7 @@ impl FilterState {
             let row = &self.covariance[i * s..][..s];
             *column = by * (row[channel] - below.map_or(0.0, |below| row[below]));
         }
-        let variance = filter.record.steps[channel].powi(2) / 12.0;
+        let variance = filter.record.steps[channel].powi(2) / 12.0 + filter.record.noise[channel].powi(2);
         let predicted =
             variance + by * (self.column[channel] - below.map_or(0.0, |below| self.column[below]));
         let error = y - measured.value;

@@ -43,6 +43,8 @@ pub(super) struct Record {
     pub(super) dt_s: f64,
     /// Travel per count of each channel (m, rad).
     pub(super) steps: Vec<f64>,
+    /// Noise of each channel besides the rounding to steps, root mean square (m, rad).
+    pub(super) noise: Vec<f64>,
     motor: Option<Motor>,
     delay_ticks: usize,
     /// Whether the cart cannot move; its channel is then 0.
@@ -74,6 +76,7 @@ impl Record {
             delay_ticks: usize::from(rig.tick.delay_ticks),
             is_clamped: false,
             is_moved: rig.actuator.acceleration.is_some(),
+            noise: rig.sensors().iter().map(|sensor| sensor.noise).collect(),
             steps,
         }
     }
@@ -155,8 +158,13 @@ impl Record {
 
     /// The samples from `from_s` to `to_s`, where time is counted across the pieces without the gaps.
     pub(super) fn part(&self, from_s: f64, to_s: f64) -> Self {
-        let mut part =
-            Self { pieces: Vec::new(), steps: self.steps.clone(), motor: self.motor.clone(), ..*self };
+        let mut part = Self {
+            pieces: Vec::new(),
+            steps: self.steps.clone(),
+            noise: self.noise.clone(),
+            motor: self.motor.clone(),
+            ..*self
+        };
         let mut passed = 0;
         let [from, to] = [from_s, to_s].map(|at_s| (at_s / self.dt_s).round() as usize);
         for piece in &self.pieces {

@@ -170,3 +170,38 @@ fn the_excitation_keeps_the_model_within_its_rail() {
         assert!(matches!(Excitation::of(&rig, 20.0, 1), Err(IdentifyError::NoEncoders(_))));
     }
 }
+
+/// The magnet of an absolute sensor is never exactly over it: 0.3° once per turn.
+#[test]
+fn an_absolute_sensor_whose_magnet_is_off_is_identified_with_its_noise_and_not_fitted_as_an_encoder() {
+    let name = Path::new("../../rigs/single-absolute.toml");
+    let text = std::fs::read_to_string(name).unwrap();
+    let file = Rig::from_toml(&text, name).unwrap();
+    let real =
+        "[reality]\neccentricity_rad = 0.0052\neccentricity_phase_rad = 0.7\nlink_length_percent = 4\n";
+    let truth = Rig::from_toml(&format!("{text}\n{real}"), name).unwrap();
+    let log = shake(&truth, 20.0, 3).unwrap();
+    let found = run(&file, &log, &TRUSTED).unwrap();
+    assert_eq!(found.refusal, None, "{found:?}");
+    let chain = truth.chain().unwrap();
+    let constants = ChainParameters::<f64>::of(&real_chain(chain, &truth.reality.parameters));
+    for (kind, wanted) in [
+        (ParameterKind::FirstMoment(0), constants.a[0]),
+        (ParameterKind::SecondMoment(0), constants.b[(0, 0)]),
+        (ParameterKind::TotalMass, constants.total_mass),
+        (ParameterKind::EccentricSine(0), 0.0052 * 0.7f64.cos()),
+        (ParameterKind::EccentricCosine(0), 0.0052 * 0.7f64.sin()),
+    ] {
+        let estimate = found.estimate(kind).unwrap();
+        println!("{kind:?}: {} ± {}, {wanted}", estimate.new, estimate.deviation);
+        let error = (estimate.new - wanted).abs();
+        assert!(error < 4.0 * estimate.deviation, "{kind:?}: {estimate:?}, {wanted}");
+    }
+    // Negative control: as an encoder, which has no noise, it fits no machine.
+    let mut encoder = file;
+    encoder.chain_mut().unwrap().links[0].encoder =
+        Some(upright_design::rig::LinkEncoder::CountsPerRev(16_384.0));
+    let mut log = log;
+    log.header.hash = encoder.hash();
+    assert!(run(&encoder, &log, &TRUSTED).unwrap().refusal.is_some());
+}

@@ -156,7 +156,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
          inertias follow."
             .to_owned(),
     );
-    if !settings.eccentricity {
+    if !settings.eccentricity && found.estimate(ParameterKind::EccentricSine(0)).is_none() {
         notes.push(format!(
             "Encoders are assumed to be centred: 0.1° of eccentricity alone changes lengths and moments by {:.1} %, whatever the \
              deviations say. --eccentricity identifies it.",
