@@ -11,7 +11,7 @@
 /* All inputs, read at the start of a tick. What is left as it is counts as an open contact. */
 typedef struct {
     /* Of 32 bits. A counter of 16 bits: count += (int16_t)(uint16_t)(timer - count). With a stepper, the first one is the
-       number of all pulses given so far. */
+       number of all pulses given so far. An absolute sensor of n bits: as a counter of n bits. */
     uint32_t raw_counts[UPRIGHT_SENSORS];
     float supply_v;
     /* 1: pressed, or its wire is open. */
@@ -22,6 +22,8 @@ typedef struct {
     uint8_t overrun;
     /* 1: the clock or the chip is not as it should be. */
     uint8_t clock_fault, board_fault;
+    /* Bit i: the sample of sensor i is bad, as the parity of an absolute sensor says. */
+    uint8_t bad_samples;
 } upright_inputs;
 
 /* The output to the power stage. */

@@ -7,7 +7,7 @@ use core::mem::offset_of;
 use core::panic::PanicInfo;
 
 use heapless::spsc::Queue;
-use upright::board::{Board, Contacts, Inputs, Output};
+use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
@@ -34,6 +34,7 @@ struct CInputs {
     overrun: u8,
     clock_fault: u8,
     board_fault: u8,
+    bad_samples: u8,
 }
 
 /// `upright_output` of the header.
@@ -59,7 +60,10 @@ unsafe extern "C" {
 }
 
 /// The board of the program in C.
-struct CBoard;
+#[derive(Default)]
+struct CBoard {
+    bad: BadSamples,
+}
 
 impl Board<SENSORS> for CBoard {
     const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
@@ -82,8 +86,10 @@ impl Board<SENSORS> for CBoard {
             overrun: 0,
             clock_fault: 0,
             board_fault: 0,
+            bad_samples: 0,
         };
         unsafe { upright_board_inputs(&mut inputs) };
+        self.bad.now = inputs.bad_samples.into();
         Inputs {
             raw_counts: inputs.raw_counts,
             supply_v: inputs.supply_v,
@@ -97,6 +103,10 @@ impl Board<SENSORS> for CBoard {
                 board_fault: inputs.board_fault != 0,
             },
         }
+    }
+
+    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+        Some(&mut self.bad)
     }
 
     fn drive(&mut self, output: &Output) {
@@ -144,7 +154,7 @@ extern "C" fn upright_start_for(sensors: u32, reset: u8) -> bool {
         _ => Reset::Software,
     };
     let firmware = Firmware::new(&TABLE, &SWING_UP, CBoard::WIDTHS, reset);
-    *control = Some(ControlTask::new(firmware, CBoard, commands.1, messages.0));
+    *control = Some(ControlTask::new(firmware, CBoard::default(), commands.1, messages.0));
     *link = Some(SerialLink::new(commands.0, messages.1));
     true
 }

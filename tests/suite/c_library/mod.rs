@@ -9,10 +9,13 @@ use crate::c_header::can_run_on_cortex_m;
 use crate::equipment::{build_crate, if_possible};
 use crate::pico::recorded::{Recorded, recorded};
 use crate::published::rig_and_table;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::harness::Pins;
+use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
+use upright_design::table::TableValues;
 use upright_test_support::equipment::output_within;
 use upright_test_support::repository;
 
@@ -54,7 +57,14 @@ fn wires(run: &Recorded) -> Vec<u8> {
         let contacts = pins.contacts;
         let flags = [contacts.limit_low, contacts.limit_high, contacts.emergency_stop, contacts.driver_fault];
         wires.extend(flags.map(u8::from));
-        wires.extend([contacts.overrun, contacts.clock_fault, contacts.board_fault, false].map(u8::from));
+        wires.extend([contacts.overrun, contacts.clock_fault, contacts.board_fault].map(u8::from));
+        let bad = pins
+            .raw_counts
+            .iter()
+            .zip(0..)
+            .map(|(count, sensor)| u8::from(count & BAD_SAMPLE != 0) << sensor);
+        // The cart's counter has 32 bits.
+        wires.push(bad.skip(1).sum());
         wires.push(pins.received.len() as u8);
         wires.extend(&pins.received);
     }
@@ -102,6 +112,16 @@ fn first_difference(run: &Recorded, answers: &[Answer]) -> Option<usize> {
     outputs.or((!is_equal).then_some(run.outputs.len()))
 }
 
+/// A run whose link has bad samples from its 100th tick of balancing on.
+fn recorded_with(rig: &Rig, table: &TableValues, scenario: &Scenario) -> Recorded {
+    recorded(
+        rig,
+        table,
+        scenario,
+        Some((State::Balancing, 100, |pins: &mut Pins| pins.raw_counts[1] ^= BAD_SAMPLE)),
+    )
+}
+
 #[test]
 #[ignore = "builds the library for a microcontroller"]
 fn a_program_in_c_homes_checks_signs_arms_and_balances_as_the_host_does() {
@@ -124,6 +144,12 @@ fn a_program_in_c_homes_checks_signs_arms_and_balances_as_the_host_does() {
     assert_eq!(status, Some(0));
     assert_eq!(first_difference(&run_of_host, &answers), None, "first different tick");
     println!("{} ticks in C, {} bytes sent", answers.len(), run_of_host.sent.concat().len());
+
+    // Bad samples of the link are the fault of its encoder, on both.
+    let bad = recorded_with(rig, table, &scenario);
+    let (_, answers) = run(&file("program"), &wires(&bad));
+    assert_eq!(first_difference(&bad, &answers), None, "first different tick with bad samples");
+    assert!(!answers.last().unwrap().enable && run_of_host.outputs.last().unwrap().enable);
 
     // Negative controls: another count is noticed; another number of encoders, and another tick, are refused.
     let mut changed = recorded;

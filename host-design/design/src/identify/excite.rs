@@ -251,7 +251,9 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
     let failed = |error: &dyn std::fmt::Display| IdentifyError::Excitation(error.to_string());
     let mut bench = Bench::new(machine, &scenario).map_err(|error| failed(&error))?;
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
-    let mut counters = vec![0; channels];
+    let (mut counters, mut at_zero) = (vec![0; channels], vec![0; channels]);
+    // An absolute sensor has its own zero, which homing knows.
+    bench.read_counters_at_zero(&mut at_zero);
     let hanging: Vec<u16> = (0..channels)
         .map(|channel| if channel == 1 { libm::round(PI / steps[1]) as i64 as u16 } else { 0 })
         .collect();
@@ -274,7 +276,8 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
     let mut speed = Speed::new(period_s);
     for number in 0..(excitation.duration_s / period_s) as u32 {
         bench.read_counters(&mut counters);
-        let counts: Vec<u16> = counters.iter().map(|&count| count as u16).collect();
+        let counts: Vec<u16> =
+            counters.iter().zip(&at_zero).map(|(count, zero)| count.wrapping_sub(*zero) as u16).collect();
         let x = f64::from(Bench::signed(0, counters[0]) as i32) * steps[0];
         if x.abs() > farthest {
             return Ok(None);

@@ -226,6 +226,9 @@ fn an_absolute_sensor_whose_magnet_is_off_is_identified_with_its_noise_and_not_f
         let error = (estimate.new - wanted).abs();
         assert!(error < 4.0 * estimate.deviation, "{kind:?}: {estimate:?}, {wanted}");
     }
+    // The sensor's own zero is not one of the link.
+    let zero = found.estimate(ParameterKind::Zero(0)).unwrap();
+    assert!(zero.new.abs() < 0.01, "{zero:?}");
     // Negative control: as an encoder, which has no noise, it fits no machine.
     let mut encoder = file;
     encoder.chain_mut().unwrap().links[0].encoder =
