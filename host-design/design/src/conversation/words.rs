@@ -86,7 +86,8 @@ pub fn instruction(telemetry: &AnyTelemetry) -> Option<String> {
         (_, Signs::Rest(sensor)) => Some(format!("let the links hang at rest; then {}", move_it(sensor))),
         (_, Signs::Move(sensor)) => Some(move_it(sensor)),
         (_, Signs::Reversed(sensor)) => {
-            Some(format!("the encoder of the {} counts the wrong way: swap its channels", joint(sensor)))
+            let remedy = "swap its channels, or set the direction of an absolute sensor";
+            Some(format!("the encoder of the {} counts the wrong way: {remedy}", joint(sensor)))
         }
         (_, Signs::Swapped { asked, moved }) => Some(format!(
             "the encoder of the {} has counted instead of that of the {}: swap their plugs",

@@ -67,8 +67,8 @@ pub(super) fn turns(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(
         let ratio = moved / wanted;
         if (ratio - 1.0).abs() > TOLERANCE {
             return Err(Stop::Machine(format!(
-                "link {sensor} counts {moved:.0} for a turn, the file says {wanted:.0}: correct encoder_counts_per_rev, or it was \
-                 not one turn counter-clockwise"
+                "link {sensor} counts {moved:.0} for a turn, the file says {wanted:.0}: correct encoder_counts_per_rev or \
+                 sensor_bits, or it was not one turn counter-clockwise"
             )));
         }
         guide.found(format!("link {sensor}: {moved:.0} counts for a turn, {wanted:.0} in the file"));
