@@ -156,11 +156,11 @@ mod tests {
     #[test]
     fn a_stepper_is_verified_without_the_imperfections_that_are_not_simulated_with_pulses() {
         let mut desk = Desk::default();
-        let answers: Vec<Value> = (0..8).map(|step| ask(&mut desk, "single-stepper", step)).collect();
-        let last = &answers[7];
+        let answers: Vec<Value> = (0..10).map(|step| ask(&mut desk, "single-stepper", step)).collect();
+        let last = &answers[9];
         let has = |name: &str| last["laws"][0]["rows"].as_array().unwrap().iter().any(|row| row[0] == name);
         assert!(has("least resonance") && has("push, end of link 1") && has("joint_friction_n_m"));
         assert!(!has("backlash_m") && !has("cart_friction_n"));
-        assert_eq!((&last["steps"], &last["next"]), (&json!(8), &Value::Null));
+        assert_eq!((&last["steps"], &last["next"]), (&json!(10), &Value::Null));
     }
 }
