@@ -56,7 +56,8 @@ fn widening(kind: ParameterKind) -> Widening {
 /// `finer`.
 pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], noise: &[f64]) -> Vec<f64> {
     let mut largest = vec![0.0f64; p.len()];
-    let mut widen = |other: Option<Vec<f64>>| {
+    let mut widen = |model: &Model, record: &Record| {
+        let other = Filter { model, record, ..*filter }.fit(p, noise, ITERATIONS).map(|(p, _)| p);
         for (largest, (other, p)) in largest.iter_mut().zip(other.iter().flatten().zip(p)) {
             *largest = largest.max((other - p).abs());
         }
@@ -65,8 +66,7 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
         let mut model = filter.model.clone();
         model.smoothing = model.smoothing.map(|smoothing| factor * smoothing);
         model.creeping = model.creeping.map(|speed| CREEPING.powf(factor.ln().signum()) * speed);
-        let other = Filter { model: &model, ..*filter };
-        widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
+        widen(&model, filter.record);
     }
     let others = if filter.model.excess == [0.0; 2] { &[][..] } else { &OTHER_EXCESSES };
     for factors in others {
@@ -74,18 +74,15 @@ pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], no
         for (excess, factor) in model.excess.iter_mut().zip(factors) {
             *excess = if *excess > 0.0 { factor * *excess } else { UNSEEN_EXCESS };
         }
-        let other = Filter { model: &model, ..*filter };
-        widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
+        widen(&model, filter.record);
     }
     let [cart, joints] = filter.model.excess;
     if filter.model.joints_excess_at_most > joints {
         let model = Model { excess: [cart, filter.model.joints_excess_at_most], ..filter.model.clone() };
-        let other = Filter { model: &model, ..*filter };
-        widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
+        widen(&model, filter.record);
     }
     if let Some(record) = finer {
-        let other = Filter { record, ..*filter };
-        widen(other.fit(p, noise, ITERATIONS).map(|(p, _)| p));
+        widen(filter.model, record);
     }
     largest
 }

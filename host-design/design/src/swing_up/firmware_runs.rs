@@ -23,7 +23,7 @@ use crate::verify::wilson;
 /// How long a raised rig balances before it is lowered (s).
 const UPRIGHT_S: f64 = 1.0;
 /// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
-const TELEMETRY_TICKS: u16 = 20;
+pub(super) const TELEMETRY_TICKS: u16 = 20;
 
 /// The errors in a set of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -7,6 +7,7 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
+use super::firmware_runs::TELEMETRY_TICKS;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::Transition;
 use crate::parallel;
@@ -29,8 +30,6 @@ const UPRIGHT_S: f64 = 0.5;
 const AFTER_S: f64 = 1.0;
 /// Longest time from the request until a lowering begins (s).
 const LONGEST_WAIT_S: f64 = 5.0;
-/// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
-const TELEMETRY_TICKS: u16 = 20;
 
 /// Margins at one moment of a motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -6,6 +6,7 @@ use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::SwingUpError;
+use super::firmware_runs::TELEMETRY_TICKS;
 use super::robustness::{MotionSpread, drawn};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::{Transition, rest};
@@ -23,8 +24,6 @@ const BALANCE_S: f64 = 1.0;
 const HANG_S: f64 = 8.0;
 /// Largest angle from an equilibrium at which a link counts as being there (rad).
 const NEAR_RAD: f64 = ANGLE_RAD;
-/// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
-const TELEMETRY_TICKS: u16 = 20;
 
 /// All motions of a table, in an order in which each begins where the one before it has ended.
 #[derive(Debug, Clone, PartialEq)]

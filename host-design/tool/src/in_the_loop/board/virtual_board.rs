@@ -18,6 +18,7 @@ use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
 
 use super::pulse_count::{PulseCount, PulseWatch};
+use crate::image::BoardName;
 
 /// Inputs change this long before a tick.
 const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
@@ -29,8 +30,6 @@ const QUIET: Time = 60 * UNITS_PER_MICROSECOND;
 const START_S: f64 = 1.0;
 /// An unmapped address: executing it is a processor fault.
 const NOWHERE: u32 = 0x3000_0000;
-/// Bits of an absolute sensor.
-const BITS: u32 = 14;
 /// Lowest address of the stack (memory.x).
 const STACK_END: u32 = 0x2000_0000;
 /// Exception number of SysTick.
@@ -123,7 +122,7 @@ impl VirtualBoard {
             SimulatedBoard::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
         let is_absolute = table.absolute.zero_counts.iter().map(|&zero| zero >= 0);
-        let angles = is_absolute.map(|is| is.then(|| AbsoluteSensor::new(BITS)));
+        let angles = is_absolute.map(|is| is.then(|| AbsoluteSensor::new(BoardName::ANGLE_BITS)));
         let pulses = table.steps.map(|_| PulseCount::default());
         if pulses.is_some() {
             board.record_pulses();
@@ -258,7 +257,7 @@ impl VirtualBoard {
     fn turn(&mut self, counts: &[u32]) {
         for (encoder, (angle, &count)) in self.angles.iter_mut().zip(counts).enumerate() {
             let Some(angle) = angle else { continue };
-            let reading = count as u16 & ((1 << BITS) - 1);
+            let reading = count as u16 & ((1 << BoardName::ANGLE_BITS) - 1);
             self.board.apply(Input::Angle { encoder, reading });
             if let Some(position) = self.positions.get_mut(encoder) {
                 *position = i64::from(angle.count(reading.into()) as i32);
