@@ -11,7 +11,7 @@ use upright::table::Equilibrium;
 use super::SwingUpError;
 use super::closed_loop::deviation;
 use super::demonstration::{hang, up_and_down};
-use super::robustness::{MotionSpread, RandomRuns, drawn};
+use super::robustness::{MotionSpread, RandomRuns, TELEMETRY_TICKS, drawn};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::{RaiseAndLower, Transition};
 use crate::rig::{LinkEncoder, PlantDescription, Rig};
@@ -22,8 +22,6 @@ use crate::verify::wilson;
 
 /// How long a raised rig balances before it is lowered (s).
 const UPRIGHT_S: f64 = 1.0;
-/// Ticks between two telemetry messages once the hand has let go, which it does when the first one says so.
-pub(super) const TELEMETRY_TICKS: u16 = 20;
 
 /// The errors in a set of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

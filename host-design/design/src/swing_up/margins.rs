@@ -7,7 +7,7 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
-use super::firmware_runs::TELEMETRY_TICKS;
+use super::robustness::TELEMETRY_TICKS;
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::Transition;
 use crate::parallel;

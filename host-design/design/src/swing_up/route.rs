@@ -6,8 +6,7 @@ use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::SwingUpError;
-use super::firmware_runs::TELEMETRY_TICKS;
-use super::robustness::{MotionSpread, drawn};
+use super::robustness::{MotionSpread, TELEMETRY_TICKS, drawn};
 use crate::harness::{Harness, HarnessError, Target, goals, with_firmware};
 use crate::motion::{Transition, rest};
 use crate::plant::{absolute_angles, without_turns};
