@@ -14,6 +14,9 @@ const TIME_S: [f64; 2] = [0.5, 5.0];
 const FIRST_ITERATIONS: usize = 1;
 const ITERATIONS: usize = 4;
 const FINALISTS: usize = 8;
+/// Rounds of iterations for the wiring of the file, each with new weights of the channels; the others have one. It is
+/// not accused because its fit is slow.
+const ROUNDS_OF_FILE: usize = 3;
 /// Wrong counts per turn that are tried.
 const FACTORS: [f64; 6] = [0.25, 1.0 / 3.0, 0.5, 2.0, 3.0, 4.0];
 /// A wiring other than that of the file is believed when the residuals are smaller by this factor.
@@ -240,10 +243,10 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
     let short = record.part(TIME_S[0], TIME_S[1]);
     let short = if short.pieces.is_empty() { record.clone() } else { short };
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-    let score = |wiring: &Wiring, iterations: usize| {
+    let score = |wiring: &Wiring, iterations: usize, rounds: usize| {
         let record = wiring.undone(&short);
         let shooting = Shooting { model, record: &record, priors, free: true };
-        let fit = shooting.fit_settled(&start, WINDOW_S, iterations, 1);
+        let fit = shooting.fit_settled(&start, WINDOW_S, iterations, rounds);
         // Relative to the motion: a factor on the counts must not make residuals small. With `max` alone, a fit that
         // has diverged would be the best.
         let of = |(channel, &rms): (usize, &f64)| match rms.is_finite() {
@@ -259,14 +262,14 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
     let sort = |scores: &mut Vec<(f64, Wiring)>| scores.sort_by(|one, other| one.0.total_cmp(&other.0));
     // All of them with few iterations, then the best ones with all.
     let judge = |wirings: &[Wiring]| {
-        let mut scores = parallel::map(wirings, |wiring| score(wiring, FIRST_ITERATIONS));
+        let mut scores = parallel::map(wirings, |wiring| score(wiring, FIRST_ITERATIONS, 1));
         sort(&mut scores);
         scores.truncate(FINALISTS);
-        parallel::map(&scores, |(_, wiring)| score(wiring, ITERATIONS))
+        parallel::map(&scores, |(_, wiring)| score(wiring, ITERATIONS, 1))
     };
     let (file, others) = wirings(record.channels, record.is_moved);
     progress(ProgressStep::Begin("wiring", (1 + others.len() + FINALISTS) as u64));
-    let (of_file, file) = score(&file, ITERATIONS);
+    let (of_file, file) = score(&file, ITERATIONS, ROUNDS_OF_FILE);
     let mut scores = judge(&others);
     scores.push((of_file, file));
     sort(&mut scores);
