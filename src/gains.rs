@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(13),
+    format: upright::table_format!(14),
     // Number of states; equal to `NX` in a sound table.
     states: 10,
     // Number of sensors; equal to `NY` in a sound table.
@@ -103,6 +103,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         ]),
         // Index of the state that each sensor measures.
         measured: [0, 2, 4, 6, 8],
+        // Age of each sensor's reading (s): it shows its state as it was, less the next state, the rate, by this time.
+        delay_s: columns([[0.0, 0.0, 0.0, 0.0, 0.0]]),
         // Travel per count of each sensor (m or rad).
         step: columns([[2e-5, 0.0015339808, 0.0015339808, 0.0015339808, 0.0015339808]]),
     }),

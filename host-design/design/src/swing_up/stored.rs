@@ -72,10 +72,11 @@ pub(super) fn header(rig: &str, hash: &str) -> String {
 }
 
 /// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included, but not the zeros of
-/// absolute sensors, which no motion depends on.
+/// absolute sensors and the age of readings, which no motion depends on.
 pub(super) fn request_hash(rig: &Rig) -> String {
     let mut rig = rig.clone();
     for link in rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links) {
+        link.sensor_delay_s = 0.0;
         if let Some(LinkEncoder::Absolute { zero_counts, .. }) = &mut link.encoder {
             *zero_counts = 0;
         }
