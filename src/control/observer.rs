@@ -89,6 +89,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     }
 
     #[cold]
+    #[inline(never)]
     fn measured_looking_up(&self, estimate: &[T; NX]) -> [T; NY] {
         let state = |sensor: usize| self.gains.measured.get(sensor).map_or(NX, |&state| state as usize);
         let mut measured: [T; NY] = select(state, estimate);

@@ -217,7 +217,7 @@ impl<R: Real> PlantModel<R> {
             let (row, one) = (s + i - 1, R::one());
             if i == 1 { b[(row, 0)] = one } else { a[(row, row - 1)] = one }
         }
-        Self { a, b, c: c.beside(&Matrix::zeros(c.rows(), past)), states: s }
+        Self { a, b, c: c.beside(&Matrix::zeros(c.rows(), s + past - c.cols())), states: s }
     }
 }
 
