@@ -85,9 +85,7 @@ fn is_stable(rig: &Rig, design: &Design<f64>, [stiffness, damping]: [f64; 2]) ->
     }
     let after = exponential(&moving.scaled(&period_s));
     // Rows of x̂ and of the command's speed, from the plant's state and x̂⁻.
-    let sensors = rig.sensors();
-    let c = Matrix::from_fn(sensors.len(), s, |i, j| f64::from(u8::from(sensors[i].state == j)));
-    let corrected = &kalman.l_filter * &c;
+    let corrected = &kalman.l_filter * &rig.measurement();
     let estimate = corrected.beside(&(&Matrix::identity(s) - &corrected));
     let drive = rig.actuator.acceleration.as_ref()?;
     let mut speed = law.k.scaled(&-drive.lead_s(period_s));

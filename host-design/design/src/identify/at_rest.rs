@@ -34,7 +34,7 @@ pub(super) fn with_excess(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Mode
     };
     let cost = |at: ExcessIndices| {
         let other = Filter { model: &model(at), record: &short, ..*filter };
-        other.fit(p, noise, ITERATIONS).map_or(f64::INFINITY, |(_, normal)| normal.cost)
+        other.fit_cost(p, noise, ITERATIONS).map_or(f64::INFINITY, |(_, cost)| cost)
     };
     let own = cost(NONE);
     // The tried values with one index changed as long as that lowers the cost.

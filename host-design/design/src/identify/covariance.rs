@@ -57,7 +57,7 @@ fn widening(kind: ParameterKind) -> Widening {
 pub(super) fn changes(filter: &Filter<'_>, finer: Option<&Record>, p: &[f64], noise: &[f64]) -> Vec<f64> {
     let mut largest = vec![0.0f64; p.len()];
     let mut widen = |model: &Model, record: &Record| {
-        let other = Filter { model, record, ..*filter }.fit(p, noise, ITERATIONS).map(|(p, _)| p);
+        let other = Filter { model, record, ..*filter }.fit_cost(p, noise, ITERATIONS).map(|(p, _)| p);
         for (largest, (other, p)) in largest.iter_mut().zip(other.iter().flatten().zip(p)) {
             *largest = largest.max((other - p).abs());
         }

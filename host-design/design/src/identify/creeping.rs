@@ -9,7 +9,7 @@ const SPEEDS_M_PER_S: [f64; 4] = [0.001, 0.002, 0.004, 0.008];
 const FACTORS: [f64; 2] = [1.4, 1.15];
 /// Duration of the part of the record on which they are tried (s).
 const TRIAL_S: f64 = 20.0;
-/// Iterations of each fit.
+/// Iterations of the first fits; the others start near their end and take one.
 const ITERATIONS: usize = 2;
 /// Least fall of -2 ln L with which a cart that never sticks is believed.
 const LEAST_GAIN: f64 = 12.0;
@@ -28,28 +28,27 @@ pub(super) fn found(filter: &Filter<'_>, p: &[f64], noise: &[f64]) -> Option<(Mo
     };
     let unfitted =
         |speed: f64| Filter { model: &with(speed), record: &short, ..*filter }.run(p, noise, false).cost;
-    let fitted = |speed: f64, p: &[f64]| {
+    let fitted = |speed: f64, p: &[f64], iterations: usize| {
         let model = with(speed);
-        let other = Filter { model: &model, record: &short, ..*filter };
-        other.fit(p, noise, ITERATIONS).map(|(p, normal)| (normal.cost, p))
+        Filter { model: &model, record: &short, ..*filter }.fit_cost(p, noise, iterations)
     };
-    let own = Filter { record: &short, ..*filter }.fit(p, noise, ITERATIONS)?.1.cost;
+    let (_, own) = Filter { record: &short, ..*filter }.fit_cost(p, noise, ITERATIONS)?;
     let first = SPEEDS_M_PER_S.map(|speed| (unfitted(speed), speed));
     let (_, mut speed) = first.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let mut best = fitted(speed, p)?;
+    let mut best = fitted(speed, p, ITERATIONS)?;
     // Written so that NaN is not believed.
-    let is_better = best.0 < own;
+    let is_better = best.1 < own;
     if !is_better {
         return None;
     }
     for factor in FACTORS {
         for factor in [factor, 1.0 / factor] {
-            while let Some(other) = fitted(factor * speed, &best.1).filter(|other| other.0 < best.0) {
+            while let Some(other) = fitted(factor * speed, &best.0, 1).filter(|other| other.1 < best.1) {
                 (speed, best) = (factor * speed, other);
             }
         }
     }
-    (own - best.0 > LEAST_GAIN).then(|| (with(speed), best.1))
+    (own - best.1 > LEAST_GAIN).then(|| (with(speed), best.0))
 }
 
 impl Model {

@@ -5,7 +5,7 @@
 
 use super::cart_force::CartForce;
 use super::parameters::Layout;
-use super::rows::add_multiple;
+use super::rows::{factorise, solve};
 use super::stribeck;
 
 /// The chain in the notation of `ChainParameters`, for any number of links n, in the m = n + 1 coordinates x, φ_1 …
@@ -67,6 +67,11 @@ pub(super) struct Accelerations {
     factors: Vec<f64>,
     sine: Vec<f64>,
     cosine: Vec<f64>,
+    /// Sine and cosine of the tilt.
+    slope: (f64, f64),
+    /// Of the cart, [`Model::cart_friction`]; of each joint, [`Model::friction`].
+    cart_friction: [f64; 3],
+    friction: Vec<[f64; 3]>,
 }
 
 impl Model {
@@ -127,6 +132,9 @@ impl Accelerations {
             factors: vec![0.0; m * m],
             sine: vec![0.0; m],
             cosine: vec![0.0; m],
+            slope: (0.0, 1.0),
+            cart_friction: [0.0; 3],
+            friction: vec![[0.0; 3]; m - 1],
         }
     }
 
@@ -134,7 +142,9 @@ impl Accelerations {
     pub(super) fn accelerate(&mut self, model: &Model, p: &[f64], at: &[f64], input: &CartForce) {
         let (n, m, layout) = (model.layout.links, model.coordinates(), model.layout);
         let (v, w, bristle) = (at[m], &at[m + 1..2 * m], at[2 * m]);
-        let (total, (slope_sine, slope_cosine)) = (p[Layout::TOTAL_MASS], libm::sincos(p[layout.tilt()]));
+        self.slope = libm::sincos(p[layout.tilt()]);
+        self.cart_friction = model.cart_friction(v, bristle);
+        let (total, (slope_sine, slope_cosine)) = (p[Layout::TOTAL_MASS], self.slope);
         for j in 0..n {
             (self.sine[j], self.cosine[j]) = libm::sincos(at[1 + j]);
         }
@@ -143,7 +153,7 @@ impl Accelerations {
         self.factors[0] = total;
         right[0] = input.force
             - (p[layout.viscous(0)] + input.back_emf) * v
-            - p[layout.dry(0)] * model.cart_friction(v, bristle)[0]
+            - p[layout.dry(0)] * self.cart_friction[0]
             - model.gravity * total * slope_sine;
         let mut below = 0.0;
         for j in 0..n {
@@ -158,7 +168,8 @@ impl Accelerations {
                     self.factors[(j + 1) * m + k + 1] = b * (cosine[j] * cosine[k] + sine[j] * sine[k]);
                 }
             }
-            let friction = model.friction(p, at, j, w[j] - below)[0];
+            self.friction[j] = model.friction(p, at, j, w[j] - below);
+            let friction = self.friction[j][0];
             below = w[j];
             right[j + 1] = torque - friction - p[layout.drag(j)] * w[j].abs() * w[j];
             if j > 0 {
@@ -198,11 +209,10 @@ impl Accelerations {
         let w = &at[m + 1..2 * m];
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
-        let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
-        let [_, by_speed, by_bristle] = model.cart_friction(at[m], at[2 * m]);
+        let (slope_sine, slope_cosine) = self.slope;
+        let [_, by_speed, by_bristle] = self.cart_friction;
         by[m] -= input.back_emf + p[layout.viscous(0)] + p[layout.dry(0)] * by_speed;
         by[2 * m] -= p[layout.dry(0)] * by_bristle;
-        let mut below = 0.0;
         for j in 0..n {
             let (a, row) = (p[layout.first_moment(j)], (j + 1) * columns);
             by[1 + j] -= a * (sine[j] * wdot[j] + cosine[j] * w[j] * w[j]);
@@ -218,8 +228,7 @@ impl Accelerations {
                 by[row + 1 + k] -= turn;
                 by[row + m + 1 + k] -= 2.0 * across * w[k];
             }
-            let slope = model.friction(p, at, j, w[j] - below)[1];
-            below = w[j];
+            let slope = self.friction[j][1];
             by[row + m + 1 + j] -= slope + 2.0 * p[layout.drag(j)] * w[j].abs();
             if j > 0 {
                 by[row + m + j] += slope;
@@ -242,10 +251,10 @@ impl Accelerations {
         let (v, w, s, gravity) = (at[m], &at[m + 1..2 * m], model.states(), model.gravity);
         let (xdd, wdot) = (self.acceleration[0], &self.acceleration[1..]);
         let (sine, cosine, by) = (&self.sine, &self.cosine, &mut self.jacobian);
-        let (slope_sine, slope_cosine) = libm::sincos(p[layout.tilt()]);
+        let (slope_sine, slope_cosine) = self.slope;
         by[s + Layout::TOTAL_MASS] -= xdd + gravity * slope_sine;
         by[s + layout.viscous(0)] -= v;
-        by[s + layout.dry(0)] -= model.cart_friction(v, at[2 * m])[0];
+        by[s + layout.dry(0)] -= self.cart_friction[0];
         by[s + layout.tilt()] -= gravity * p[Layout::TOTAL_MASS] * slope_cosine;
         by[s + layout.delay()] += input.by_delay;
         by[s + layout.dead_zone()] += input.by_dead_zone;
@@ -272,7 +281,7 @@ impl Accelerations {
             }
             let rate = w[j] - below;
             below = w[j];
-            let direction = model.friction(p, at, j, rate)[2];
+            let direction = self.friction[j][2];
             by[row + layout.drag(j)] -= w[j].abs() * w[j];
             by[row + layout.viscous(j + 1)] -= rate;
             by[row + layout.dry(j + 1)] -= direction;
@@ -307,47 +316,6 @@ impl Accelerations {
         }
         solve(&self.factors, m, m, &mut columns);
         columns
-    }
-}
-
-/// Replaces the lower triangle of a symmetric positive definite matrix, m×m, by L and 1/D of `L D Lᵀ`.
-fn factorise(matrix: &mut [f64], m: usize) {
-    for k in 0..m {
-        let inverse = 1.0 / matrix[k * m + k];
-        matrix[k * m + k] = inverse;
-        for i in k + 1..m {
-            let l = matrix[i * m + k] * inverse;
-            for j in k + 1..=i {
-                matrix[i * m + j] -= l * matrix[j * m + k];
-            }
-        }
-        for i in k + 1..m {
-            matrix[i * m + k] *= inverse;
-        }
-    }
-}
-
-/// Replaces `columns` right-hand sides, stored as the columns of m rows, by their solutions.
-fn solve(factors: &[f64], m: usize, columns: usize, rows: &mut [f64]) {
-    let take = |rows: &mut [f64], to: usize, from: usize, factor: f64| {
-        let (low, high) = (to.min(from), to.max(from));
-        let (first, second) = rows.split_at_mut(high * columns);
-        let (first, second) = (&mut first[low * columns..][..columns], &mut second[..columns]);
-        let (to, from) = if to < from { (first, &*second) } else { (second, &*first) };
-        add_multiple(to, -factor, from);
-    };
-    for i in 1..m {
-        for k in 0..i {
-            take(rows, i, k, factors[i * m + k]);
-        }
-    }
-    for i in 0..m {
-        rows[i * columns..][..columns].iter_mut().for_each(|value| *value *= factors[i * m + i]);
-    }
-    for k in (0..m).rev() {
-        for i in k + 1..m {
-            take(rows, k, i, factors[i * m + k]);
-        }
     }
 }
 

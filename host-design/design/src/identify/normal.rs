@@ -65,16 +65,11 @@ impl Normal {
 
     /// Adds the prior, mean 0 and deviation 1 for each scaled parameter; `at` holds their current values.
     pub(super) fn add_prior(&mut self, at: &[f64]) {
-        for (i, at) in at.iter().enumerate() {
+        self.cost += at.iter().map(|at| at * at).sum::<f64>();
+        for (i, at) in at.iter().enumerate().take(self.size) {
             self.matrix[i * self.size + i] += 1.0;
             self.gradient[i] -= at;
-            self.cost += at * at;
         }
-    }
-
-    /// Root mean square of the residuals of each channel.
-    pub(super) fn rms(&self) -> Vec<f64> {
-        self.squares.iter().map(|sum| (sum / self.count.max(1) as f64).sqrt()).collect()
     }
 
     /// Entry of A.

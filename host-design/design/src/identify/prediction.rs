@@ -68,9 +68,7 @@ impl Filter<'_> {
         let one = |segment: (usize, usize, usize)| self.segment(p, noise, &inputs[segment.0], segment, free);
         let each = parallel::map(self.segments(), one);
         let mut sum = each.iter().fold(Normal::new(size, self.record.channels), Normal::merge);
-        if free {
-            sum.add_prior(&scaled(self.priors, p));
-        }
+        sum.add_prior(&scaled(self.priors, p));
         sum
     }
 
@@ -123,9 +121,24 @@ impl Filter<'_> {
     /// Gauss–Newton from `p`, at most `iterations` steps; returns the parameters and the normal equations there, or
     /// none if these are not positive definite.
     pub(super) fn fit(&self, p: &[f64], noise: &[f64], iterations: usize) -> Option<(Vec<f64>, Normal)> {
+        self.iterate(p, noise, iterations, true)
+    }
+
+    /// As [`fit`](Self::fit), but returns the cost instead of the normal equations, which take twice the time.
+    pub(super) fn fit_cost(&self, p: &[f64], noise: &[f64], iterations: usize) -> Option<(Vec<f64>, f64)> {
+        self.iterate(p, noise, iterations, false).map(|(p, normal)| (p, normal.cost))
+    }
+
+    fn iterate(
+        &self,
+        p: &[f64],
+        noise: &[f64],
+        iterations: usize,
+        to_end: bool,
+    ) -> Option<(Vec<f64>, Normal)> {
         let mut p = p.to_vec();
         let mut normal = self.run(&p, noise, true);
-        for _ in 0..iterations {
+        for iteration in 1..=iterations {
             let step = normal.bounded_step(0.0, &room_below(self.model.layout, self.priors, &p))?;
             let inverse = normal.factor(0.0)?.inverse();
             let deviations = (0..step.len()).map(|i| inverse[i * step.len() + i].sqrt());
@@ -139,7 +152,7 @@ impl Filter<'_> {
                 let moved = p.iter().zip(self.priors).zip(&step);
                 let trial: Vec<f64> =
                     moved.map(|((p, prior), step)| p + share * prior.deviation * step).collect();
-                let other = self.run(&trial, noise, true);
+                let other = self.run(&trial, noise, to_end || iteration < iterations);
                 (other.cost < normal.cost).then_some((trial, other))
             });
             let Some(better) = better else { break };

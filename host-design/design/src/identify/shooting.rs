@@ -95,20 +95,32 @@ impl Shooting<'_> {
 
     fn fit_windows(&self, p: &[f64], windows: Vec<ShootingWindow>, iterations: usize, rounds: usize) -> Fit {
         let mut fit = Fit { p: p.to_vec(), windows, rms: self.record.steps.clone() };
-        let channels = self.record.channels;
         for _ in 0..rounds {
-            let weights: Vec<f64> = self.linearise(&fit, &vec![1.0; channels]).0.rms();
             let floor = self.record.steps.iter().map(|step| 0.2 * step);
             let weights: Vec<f64> =
-                weights.iter().zip(floor).map(|(rms, floor)| rms.max(floor).powi(-2)).collect();
+                self.rms(&fit).iter().zip(floor).map(|(rms, floor)| rms.max(floor).powi(-2)).collect();
             if self.free {
                 self.descend(&mut fit, &weights, iterations);
             } else {
                 fit.windows = self.settled(p, &fit.windows, &weights, iterations);
             }
         }
-        fit.rms = self.linearise(&fit, &vec![1.0; channels]).0.rms();
+        fit.rms = self.rms(&fit);
         fit
+    }
+
+    /// Root mean square of the residuals of each channel.
+    fn rms(&self, fit: &Fit) -> Vec<f64> {
+        let count = self.record.channels;
+        let predictions = self.predictions(fit);
+        let mut squares = vec![0.0; count];
+        for (piece, sample, predicted) in &predictions {
+            let measured = &self.record.pieces[*piece].y[sample * count..];
+            for (sum, (measured, predicted)) in squares.iter_mut().zip(measured.iter().zip(predicted)) {
+                *sum += (measured - predicted).powi(2);
+            }
+        }
+        squares.iter().map(|sum| (sum / predictions.len().max(1) as f64).sqrt()).collect()
     }
 
     /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated, and the standard
@@ -140,20 +152,20 @@ impl Shooting<'_> {
 
     /// Predictions of `fit` in its windows: piece, sample, and the predicted measurements of all channels.
     pub(super) fn predictions(&self, fit: &Fit) -> Vec<(usize, usize, Vec<f64>)> {
-        let (model, layout) = (self.model, self.model.layout);
-        let mut rows = Vec::new();
-        let mut step = Step::new(model, false);
-        for window in &fit.windows {
-            let inputs = self.record.inputs(layout, &fit.p, window.piece);
+        let (model, inputs) = (self.model, self.inputs(&fit.p));
+        let each = parallel::map(&fit.windows, |window| {
+            let mut step = Step::new(model, false);
             let mut state = window.state.clone();
-            for sample in window.first..window.first + window.samples {
+            let row = |sample: usize| {
                 let measure = |channel| model.measure(&fit.p, &state, channel).value;
-                rows.push((window.piece, sample, (0..self.record.channels).map(measure).collect()));
-                step.take(model, &fit.p, &state, &inputs[sample], self.record.dt_s);
+                let row = (window.piece, sample, (0..self.record.channels).map(measure).collect());
+                step.take(model, &fit.p, &state, &inputs[window.piece][sample], self.record.dt_s);
                 state.copy_from_slice(&step.end);
-            }
-        }
-        rows
+                row
+            };
+            (window.first..window.first + window.samples).map(row).collect::<Vec<_>>()
+        });
+        each.into_iter().flatten().collect()
     }
 
     /// Levenberg–Marquardt iterations from `fit`.
@@ -345,7 +357,7 @@ impl Shooting<'_> {
             }
             normal.count += 1;
             step.take(model, p, &state, &inputs[sample], self.record.dt_s);
-            propagate(&step, &by, &mut next, s, columns);
+            step.propagate(&by, &mut next);
             core::mem::swap(&mut by, &mut next);
             state.copy_from_slice(&step.end);
         }
@@ -393,17 +405,6 @@ pub(super) fn scaled(priors: &[Prior], p: &[f64]) -> Vec<f64> {
         if prior.deviation > 0.0 { (p - prior.value) / prior.deviation } else { 0.0 }
     };
     priors.iter().zip(p).map(one).collect()
-}
-
-/// `next = F by + [0 F_p]` with the derivatives `[F F_p]` of a step.
-fn propagate(step: &Step, by: &[f64], next: &mut [f64], s: usize, columns: usize) {
-    for (row, local) in next.chunks_exact_mut(columns).zip(step.by.chunks_exact(step.columns)) {
-        row[..s].fill(0.0);
-        row[s..].copy_from_slice(&local[s..]);
-        for (factor, from) in local[..s].iter().zip(by.chunks_exact(columns)) {
-            add_multiple(row, *factor, from);
-        }
-    }
 }
 
 #[cfg(test)]

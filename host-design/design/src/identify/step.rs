@@ -118,6 +118,18 @@ impl Step {
         }
     }
 
+    /// `next = F by + [0 F_p]` with the derivatives `[F F_p]` of the step; `by` and `next` have as many columns.
+    pub(super) fn propagate(&self, by: &[f64], next: &mut [f64]) {
+        let (s, columns) = (self.end.len(), self.columns);
+        for (row, local) in next.chunks_exact_mut(columns).zip(self.by.chunks_exact(columns)) {
+            row[..s].fill(0.0);
+            row[s..].copy_from_slice(&local[s..]);
+            for (factor, from) in local[..s].iter().zip(by.chunks_exact(columns)) {
+                add_multiple(row, *factor, from);
+            }
+        }
+    }
+
     /// Accelerations per unit of force and torque at the last stage of the step; see [`Accelerations::inputs`].
     pub(super) fn inputs(&self) -> Vec<f64> {
         self.local.inputs()

@@ -217,6 +217,9 @@ impl Description {
             }
             None => self.note("encoder step", "none"),
         }
+        if link.sensor_delay_s > 0.0 {
+            self.row(&LINK, given("sensor_delay_s"), &[link.sensor_delay_s]);
+        }
     }
 
     fn model(&mut self, model: &LinearPlant) {

@@ -7,7 +7,7 @@ use upright::control::encoder::{AbsoluteSensor, is_at_end};
 use super::description::Rig;
 use super::sections::chain::PlantDescription;
 use super::sections::link::LinkEncoder;
-use crate::numerics::Real;
+use crate::numerics::{Matrix, Real};
 
 /// A sensor that measures one state in discrete steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +18,8 @@ pub struct Sensor {
     pub noise: f64,
     /// How it reads, if it is an absolute sensor of an angle.
     pub absolute: Option<AbsoluteRange>,
+    /// Age of its reading at the tick (s).
+    pub delay_s: f64,
     resolution: Resolution,
 }
 
@@ -73,7 +75,7 @@ enum Resolution {
 impl Sensor {
     /// A sensor of this state that counts steps of this size.
     const fn of_step(state: usize, step: f64) -> Self {
-        Self { state, noise: 0.0, absolute: None, resolution: Resolution::Step(step) }
+        Self { state, noise: 0.0, absolute: None, delay_s: 0.0, resolution: Resolution::Step(step) }
     }
 
     fn of_link(state: usize, encoder: LinkEncoder) -> Self {
@@ -90,7 +92,7 @@ impl Sensor {
                     None => Resolution::CountsPerRev(readings),
                     Some(travel_rad) => Resolution::Step(travel_rad / readings),
                 };
-                let mut sensor = Self { state, noise: noise_rad, absolute: None, resolution };
+                let mut sensor = Self { noise: noise_rad, resolution, ..Self::of_step(state, 0.0) };
                 let step: f64 = sensor.step();
                 let (turn, rest) = ((TAU / step).round() as u32, if state == 2 { PI / step } else { 0.0 });
                 sensor.absolute = Some(AbsoluteRange { bits: used, zero, turn, rest: rest.round() as i64 });
@@ -115,6 +117,17 @@ impl Sensor {
 }
 
 impl Rig {
+    /// C of `y = C x` for [`sensors`](Self::sensors): each measures its state, less the next one, its rate, by the age
+    /// of the reading. This is exact to first order in that age.
+    pub fn measurement<R: Real>(&self) -> Matrix<R> {
+        let sensors = self.sensors();
+        Matrix::from_fn(sensors.len(), self.states(), |i, j| match &sensors[i] {
+            sensor if sensor.state == j => R::one(),
+            sensor if sensor.state + 1 == j => R::from_f64(-sensor.delay_s),
+            _ => R::zero(),
+        })
+    }
+
     /// The sensors with a resolution in the rig file, in the order of the states: the cart's and the links' encoders,
     /// or the measured states of a model.
     pub fn sensors(&self) -> Vec<Sensor> {
@@ -124,7 +137,8 @@ impl Rig {
                 let step_m = self.actuator.acceleration.as_ref().map(|drive| drive.step_m);
                 let cart = step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_step(0, step));
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {
-                    description.encoder.map(|encoder| Sensor::of_link(2 + 2 * link, encoder))
+                    let sensor = Sensor::of_link(2 + 2 * link, description.encoder?);
+                    Some(Sensor { delay_s: description.sensor_delay_s, ..sensor })
                 });
                 cart.into_iter().chain(links).collect()
             }

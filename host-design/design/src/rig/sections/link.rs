@@ -125,6 +125,13 @@ const LINK_KEYS: &[Key] = &[
         meaning: "noise of this sensor besides the rounding to its bits, root mean square",
         absent: Absent::Numbers(&[0.0]),
     },
+    Key {
+        name: "sensor_delay_s",
+        unit: "s",
+        rule: Rule::NOT_NEGATIVE.worded("a number >= 0, with an encoder or sensor"),
+        meaning: "age of the reading of encoder or sensor at the tick, by its own filter and its bus; made up for",
+        absent: Absent::Numbers(&[0.0]),
+    },
 ];
 
 /// One link of a chain, `[[link]]`.
@@ -142,6 +149,14 @@ pub struct Link {
     pub friction_n_m_s_per_rad: f64,
     /// Resolution of the joint's encoder.
     pub encoder: Option<LinkEncoder>,
+    /// Age of its reading at the tick (s).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub sensor_delay_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 /// Resolution of a joint encoder, in the form that the file gives.
@@ -191,7 +206,13 @@ pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64, is_lowest: bool) -> R
         inertia_kg_m2: table.value("inertia_kg_m2")?,
         friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
         encoder: link_encoder(&table, is_lowest)?,
+        sensor_delay_s: table.value("sensor_delay_s")?,
     };
+    if let (None, Some(node)) = (link.encoder, table.get("sensor_delay_s")) {
+        return Err(
+            node.out_of_range("only with an encoder or sensor", "describe it, or leave sensor_delay_s out")
+        );
+    }
     if let Some(about_joint) = table.value("inertia_about_joint_kg_m2")? {
         link.set_inertia_about_joint(&table, "inertia_about_joint_kg_m2", about_joint, |least| least)?;
     }
