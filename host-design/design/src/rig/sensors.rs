@@ -1,6 +1,8 @@
 //! The sensors of a rig.
 
-use upright::control::encoder::AbsoluteSensor;
+use std::f64::consts::{PI, TAU};
+
+use upright::control::encoder::{AbsoluteSensor, is_at_end};
 
 use super::description::Rig;
 use super::sections::chain::PlantDescription;
@@ -14,12 +16,54 @@ pub struct Sensor {
     pub state: usize,
     /// Noise besides rounding, root mean square (unit of the state).
     pub noise: f64,
-    /// If it is an absolute sensor of an angle, bits per turn and reading while the links hang (counts), of those that
-    /// are used.
-    pub absolute: Option<[u32; 2]>,
+    /// How it reads, if it is an absolute sensor of an angle.
+    pub absolute: Option<AbsoluteRange>,
     /// Age of its reading at the tick (s).
     pub delay_s: f64,
     resolution: Resolution,
+}
+
+/// How an absolute sensor of an angle reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AbsoluteRange {
+    /// Bits that are used.
+    pub bits: u32,
+    /// Reading while the links hang (counts).
+    pub zero: u32,
+    /// Counts in a turn. A potentiometer reads only the first 2^bits of them.
+    pub turn: u32,
+    /// Position while the links hang (counts): the first link hangs half a turn from position 0.
+    pub rest: i64,
+}
+
+impl AbsoluteRange {
+    /// The reading at this position (counts); that of an open wire in the dead band of a potentiometer.
+    pub fn reading(&self, position: i64) -> u32 {
+        let reading = (i64::from(self.zero) + position - self.rest).rem_euclid(self.turn.into()) as u32;
+        if reading < 1 << self.bits { reading } else { 0 }
+    }
+
+    /// Whether it does not read a whole turn.
+    pub fn has_dead_band(&self) -> bool {
+        self.turn != 1 << self.bits
+    }
+
+    /// The lowest and the highest reading while the links hang with which no reading at these positions (counts) is in
+    /// the dead band.
+    pub fn zeros_that_read(&self, positions: impl Iterator<Item = i64> + Clone) -> Option<[u32; 2]> {
+        let works = |zero: &u32| {
+            let other = Self { zero: *zero, ..*self };
+            !positions.clone().any(|position| other.is_dead(other.reading(position)))
+        };
+        let mut zeros = (0..1u32 << self.bits).filter(works);
+        let low = zeros.next()?;
+        Some([low, zeros.last().unwrap_or(low)])
+    }
+
+    /// Whether this reading is in the dead band of a potentiometer, or so near that it is not used.
+    pub fn is_dead(&self, reading: u32) -> bool {
+        self.has_dead_band() && is_at_end(reading, self.bits)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,16 +84,19 @@ impl Sensor {
             LinkEncoder::CountsPerRev(counts) => {
                 Self { resolution: Resolution::CountsPerRev(counts), ..Self::of_step(state, 0.0) }
             }
-            LinkEncoder::Absolute { bits, zero_counts, noise_rad } => {
+            LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad } => {
                 let used = u32::from(bits).min(AbsoluteSensor::BITS);
                 let zero = zero_counts >> (u32::from(bits) - used);
-                let resolution = Resolution::CountsPerRev(f64::from(1u32 << used));
-                Self {
-                    noise: noise_rad,
-                    absolute: Some([used, zero]),
-                    resolution,
-                    ..Self::of_step(state, 0.0)
-                }
+                let readings = f64::from(1u32 << used);
+                let resolution = match travel_rad {
+                    None => Resolution::CountsPerRev(readings),
+                    Some(travel_rad) => Resolution::Step(travel_rad / readings),
+                };
+                let mut sensor = Self { noise: noise_rad, resolution, ..Self::of_step(state, 0.0) };
+                let step: f64 = sensor.step();
+                let (turn, rest) = ((TAU / step).round() as u32, if state == 2 { PI / step } else { 0.0 });
+                sensor.absolute = Some(AbsoluteRange { bits: used, zero, turn, rest: rest.round() as i64 });
+                sensor
             }
         }
     }

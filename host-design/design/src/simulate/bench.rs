@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 
 use super::error::SimulationError;
 use super::scenario::Scenario;
@@ -158,7 +159,8 @@ impl Bench {
         if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 }
     }
 
-    /// Writes the readings of the hardware counters into `counters`; entries without a sensor keep their value.
+    /// Writes the readings of the hardware counters into `counters`, with [`BAD_SAMPLE`] in the dead band of a
+    /// potentiometer; entries without a sensor keep their value.
     pub fn read_counters(&mut self, counters: &mut [u32]) {
         for (index, (counter, sensor)) in counters.iter_mut().zip(&mut self.sensors).enumerate() {
             if index == 0 && self.step_m.is_some() {
@@ -174,7 +176,8 @@ impl Bench {
                 let normal: f64 = StandardNormal.sample(&mut self.random);
                 position += sensor.noise * normal;
             }
-            *counter = Self::reading(index, sensor.count(position, self.counter_start));
+            let count = sensor.count(position, self.counter_start);
+            *counter = Self::reading(index, count) | if sensor.is_dead(count) { BAD_SAMPLE } else { 0 };
         }
     }
 

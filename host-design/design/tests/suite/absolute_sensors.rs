@@ -27,7 +27,7 @@ const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
 fn absolute(name: &str, noise_rad: f64) -> Rig {
     let mut rig = rig(name);
     for (link, zero_counts) in rig.chain_mut().unwrap().links.iter_mut().zip(ZEROS) {
-        link.encoder = Some(LinkEncoder::Absolute { bits: 14, zero_counts, noise_rad });
+        link.encoder = Some(LinkEncoder::Absolute { bits: 14, travel_rad: None, zero_counts, noise_rad });
     }
     rig
 }
@@ -217,7 +217,7 @@ fn another_zero_leaves_the_stored_motions_as_they_are() {
     assert!(stored.is_of(&rig));
     let changed = |rig: &mut Rig, bits, zero_counts| {
         rig.chain_mut().unwrap().links[0].encoder =
-            Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad: 1.05e-3 });
+            Some(LinkEncoder::Absolute { bits, travel_rad: None, zero_counts, noise_rad: 1.05e-3 });
     };
     changed(&mut rig, 14, 77);
     assert!(stored.is_of(&rig));
