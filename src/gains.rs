@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(13),
+    format: upright::table_format!(14),
     // Number of states; equal to `NX` in a sound table.
     states: 10,
     // Number of sensors; equal to `NY` in a sound table.
@@ -105,6 +105,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         measured: [0, 2, 4, 6, 8],
         // Travel per count of each sensor (m or rad).
         step: columns([[2e-5, 0.0015339808, 0.0015339808, 0.0015339808, 0.0015339808]]),
+        // Age of each sensor's reading (s): it shows its state as it was, less the next state, the rate, by this time.
+        delay_s: columns([[0.0, 0.0, 0.0, 0.0, 0.0]]),
     }),
     // Known Coulomb friction, if there is any: it is compensated.
     friction: None,
@@ -181,7 +183,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         still_counts: [1, 1, 1, 1, 1],
     },
     // CRC-32 of all values above.
-    crc: 0x734f_3c82,
+    crc: 0x0eb6_5da0,
 };
 
 /// This table has no swing-up.

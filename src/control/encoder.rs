@@ -119,6 +119,12 @@ impl AbsoluteSensor {
     }
 }
 
+/// Whether a reading of this many bits is within a 64th of an end of its range, where it is no angle: the wiper of a
+/// potentiometer is in its dead band, or a wire is open or has a short circuit.
+pub const fn is_at_end(reading: u32, bits: u32) -> bool {
+    matches!(reading >> bits.saturating_sub(6), 0 | 63..)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

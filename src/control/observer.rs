@@ -7,9 +7,11 @@
 use crate::table::{ObserverGains, Scalar};
 
 impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
-    /// Whether sensor i measures state 2i, as in every chain. Then no index has to be looked up.
+    /// Whether sensor i measures state 2i, as in every chain, and as it is in this tick. Then no index has to be looked
+    /// up.
     fn sensors_are_in_order(&self) -> bool {
-        self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
+        let of_this_tick = self.delay_s.iter().all(|&delay_s| delay_s == T::default());
+        of_this_tick && self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
     }
 
     /// The entries of Ad that the prediction uses without multiplying.
@@ -23,7 +25,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
     pub(crate) gains: &'t ObserverGains<NX, NY, T>,
     pattern: PredictionPattern,
-    /// Whether sensor i measures state 2i.
+    /// Whether sensor i measures state 2i, without delay.
     is_in_order: bool,
 }
 
@@ -76,7 +78,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
         innovation
     }
 
-    /// The states that the sensors measure, `C x̂` (m or rad).
+    /// What the sensors measure, `C x̂` (m or rad): each its state, less what it has moved since an old reading.
     #[inline(always)]
     pub(crate) fn measured(&self, estimate: &[T; NX]) -> [T; NY] {
         if self.is_in_order {
@@ -87,9 +89,15 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     }
 
     #[cold]
+    #[inline(never)]
     fn measured_looking_up(&self, estimate: &[T; NX]) -> [T; NY] {
-        let measured = &self.gains.measured;
-        select(|sensor| measured.get(sensor).map_or(NX, |&state| state as usize), estimate)
+        let state = |sensor: usize| self.gains.measured.get(sensor).map_or(NX, |&state| state as usize);
+        let mut measured: [T; NY] = select(state, estimate);
+        let rates: [T; NY] = select(|sensor| state(sensor) + 1, estimate);
+        for ((measured, delay_s), rate) in measured.iter_mut().zip(&self.gains.delay_s).zip(rates) {
+            *measured -= *delay_s * rate;
+        }
+        measured
     }
 
     /// Replaces the prediction x̂⁻ by the current estimate `x̂ = x̂⁻ + L e`. Calls `corrected` for each joint, with
@@ -205,6 +213,7 @@ mod tests {
             bd: vector![0.125, 0.5],
             l: matrix![0.5; 2.0],
             measured: [0],
+            delay_s: vector![0.0],
             step: vector![1.0],
         };
         let observer = Observer::new(&gains);
@@ -214,6 +223,22 @@ mod tests {
         assert_eq!((x, e), ([2.0, 3.0], [2.0]));
         observer.predict(&mut x, 8.0);
         assert_eq!(x, [4.5, 7.0]);
+    }
+
+    #[test]
+    fn an_old_reading_is_compared_with_where_the_sensor_was() {
+        let of = |delay_s: f32| ObserverGains {
+            ad: matrix![1.0f32, 0.5; 0.0, 1.0],
+            bd: vector![0.125, 0.5],
+            l: matrix![0.5; 2.0],
+            measured: [0],
+            delay_s: vector![delay_s],
+            step: vector![1.0],
+        };
+        let (old, new) = (of(0.25), of(0.0));
+        let estimate = [3.0, -2.0];
+        assert_eq!(Observer::new(&old).innovation(&[4.0], &estimate), [0.5]);
+        assert_eq!(Observer::new(&new).innovation(&[4.0], &estimate), [1.0]);
     }
 
     #[test]

@@ -21,6 +21,17 @@ impl<const NY: usize> AbsoluteZeros<NY> {
         Self { zero_counts: [-1; NY], still_counts: [1; NY] }
     }
 
+    /// Whether a sensor is absolute.
+    pub const fn is_absolute(&self, sensor: usize) -> bool {
+        sensor < NY && self.zero_counts[sensor] >= 0
+    }
+
+    /// Whether a sensor is a potentiometer, which does not read a whole turn: other absolute sensors have a power of
+    /// two of counts in a turn.
+    pub const fn is_potentiometer(&self, limits: &Limits<NY>, sensor: usize) -> bool {
+        self.is_absolute(sensor) && !limits.turn_counts[sensor].unsigned_abs().is_power_of_two()
+    }
+
     /// `home`, the positions of the sensors where the links hang, with those of absolute sensors, which read `raw`, by
     /// their own zeros; none if such a sensor is off by more than half of [`Limits::sign_counts`], so that its link
     /// does not hang or its zero is another one.

@@ -18,5 +18,7 @@ part! {
         pub measured: [u32; NY],
         /// Travel per count of each sensor (m or rad).
         pub step: SVector<T, NY>,
+        /// Age of each sensor's reading (s): it shows its state as it was, less the next state, the rate, by this time.
+        pub delay_s: SVector<T, NY>,
     }
 }

@@ -67,6 +67,7 @@ fn full() -> GainTable<4, 2> {
             bd: SVector::from_fn(|_, _| next()),
             l: SMatrix::from_fn(|_, _| next()),
             measured: [0, 2],
+            delay_s: SVector::from_fn(|_, _| next()),
             step: SVector::from_fn(|_, _| next()),
         }),
         friction: Some(FrictionMap {

@@ -75,6 +75,7 @@ fn table<const NX: usize, const NY: usize>(
             measured: core::array::from_fn(|sensor| {
                 2 * if in_order { sensor } else { NY - 1 - sensor } as u32
             }),
+            delay_s: SVector::from_fn(|_, _| if in_order { 0.0 } else { 0.1 * number().abs() }),
             step: SVector::from_fn(|_, _| number().abs()),
         }),
         friction: friction.then(|| FrictionMap {
@@ -110,7 +111,9 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
     fn tick(&mut self, target: f32, counts: &[u32; NY]) -> Vec<f32> {
         let (law, observer) = (self.table.laws.lqr.as_ref().unwrap(), self.table.observer.as_ref().unwrap());
         let e: [f32; NY] = core::array::from_fn(|i| {
-            observer.step[i] * counts[i] as i32 as f32 - self.x[observer.measured[i] as usize]
+            let state = observer.measured[i] as usize;
+            let rate = self.x.get(state + 1).copied().unwrap_or_default();
+            observer.step[i] * counts[i] as i32 as f32 - (self.x[state] - observer.delay_s[i] * rate)
         });
         let x: [f32; NX] =
             core::array::from_fn(|i| (0..NY).fold(self.x[i], |sum, j| sum + observer.l[(i, j)] * e[j]));

@@ -45,6 +45,9 @@ pub enum Input {
         /// The reading.
         reading: u16,
     },
+    /// Voltage at the wiper of a potentiometer, as a share of the converter's reference: 0 if its wire is open, which a
+    /// resistor then pulls down.
+    Wiper(f32),
     /// A defect of such a sensor.
     AngleDefect {
         /// Index into [`BoardWiring::encoders`].
@@ -214,6 +217,12 @@ impl SimulatedBoard {
                 let fraction = volts / bus.wiring.supply_divider / bus.power.volts;
                 if let Some(place) = bus.adc.inputs.get_mut(bus.wiring.supply_channel) {
                     *place = fraction;
+                }
+            }
+            Input::Wiper(share) => {
+                let channel = bus.wiring.wiper_channel;
+                if let Some(place) = channel.and_then(|channel| bus.adc.inputs.get_mut(channel)) {
+                    *place = share;
                 }
             }
             Input::ChipSupply(volts) => self.set_chip_supply(volts),

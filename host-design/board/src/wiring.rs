@@ -45,6 +45,8 @@ pub struct BoardWiring {
     pub usart: u8,
     /// Channel of the converter that measures the supply.
     pub supply_channel: usize,
+    /// Channel of the converter that measures the wiper of a potentiometer; none in a wiring without it.
+    pub wiper_channel: Option<usize>,
     /// Ratio of the divider: supply voltage over the voltage at that channel.
     pub supply_divider: f32,
     /// Reference voltage of the converter (V).
@@ -76,6 +78,7 @@ impl BoardWiring {
             receive: pin('A', 3),
             usart: 2,
             supply_channel: 12,
+            wiper_channel: Some(1),
             supply_divider: 23.0,
             reference_v: 3.3,
         };
@@ -96,6 +99,7 @@ impl BoardWiring {
             tick: pin('B', 8),
             receive: pin('B', 11),
             usart: 3,
+            wiper_channel: None,
             ..*BoardWiring::upright()
         };
         &WIRING

@@ -26,6 +26,7 @@ fn table() -> GainTable<2, 1> {
             bd: vector![0.0625, 0.25],
             l: matrix![0.5; 1.0],
             measured: [0],
+            delay_s: vector![0.0],
             step: vector![0.25],
         }),
         friction: None,
@@ -158,6 +159,7 @@ fn stepping() -> GainTable<2, 1> {
         bd: vector![0.5 * tick_s * tick_s, tick_s],
         l: matrix![0.0; 0.0],
         measured: [0],
+        delay_s: vector![0.0],
         step: vector![12.5e-6],
     };
     let steps = StepMap {

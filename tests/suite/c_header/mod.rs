@@ -112,8 +112,8 @@ fn the_header_has_the_bits_of_the_firmware_with_every_rig_and_law_however_it_is_
     }
 }
 
-/// Rigs with what none of the published ones has: delay, lag, integral, known friction.
-fn variants() -> [(&'static str, Rig); 5] {
+/// Rigs with what none of the published ones has: delay, lag, integral, known friction, old readings.
+fn variants() -> [(&'static str, Rig); 6] {
     let single = rig("single-quanser-ip02");
     let mut delayed = single.clone();
     delayed.tick.delay_ticks = 1;
@@ -128,10 +128,13 @@ fn variants() -> [(&'static str, Rig); 5] {
     let mut late = single.clone();
     late.actuator.driver_lag_s = Some(0.004);
     let late_and_integral = Rig { integral: integral.clone(), ..late.clone() };
+    let mut old = rig("double-quanser-dbpen");
+    old.chain_mut().unwrap().links[1].sensor_delay_s = 0.002;
     let both = Rig { integral: integral.clone(), ..delayed.clone() };
     [
         ("delay", delayed),
         ("delay and integral", both),
+        ("old readings", old),
         ("lag", late),
         ("lag and integral", late_and_integral),
         ("integral and friction", Rig { integral, friction, ..single }),
@@ -139,7 +142,7 @@ fn variants() -> [(&'static str, Rig); 5] {
 }
 
 #[test]
-fn delay_lag_integral_and_known_friction_have_the_bits_of_the_firmware() {
+fn delay_lag_old_readings_integral_and_known_friction_have_the_bits_of_the_firmware() {
     if !is_there("gcc") {
         return;
     }

@@ -54,7 +54,7 @@ impl Trial {
         let sensor = match kind {
             Defect::CartEncoderFrozen => 0,
             Defect::LinkEncoderFrozen => sensor.clamp(1, sensors.max(2) - 1),
-            kind if kind.is_of_absolute() => absolute(table, sensor),
+            kind if kind.is_of_absolute() => absolute(kind, table, sensor),
             Defect::EncodersSwapped => sensor.min(sensors.saturating_sub(2)).max(first),
             _ => sensor.min(sensors.saturating_sub(1)).max(first),
         };

@@ -115,7 +115,10 @@ defects! {
     StepsLost Nothing "a stepper misses all pulses of 1 to 10 ticks, then follows again" => Bounded;
     SensorDead Nothing "an absolute sensor reads 0 or all ones: its wire is open, or it has lost its magnet" => Off(10);
     SensorBit Nothing "a bit of an absolute sensor's reading is wrong in one of 5 to 50 ticks" => Bounded;
-    SampleInvalid Nothing "a board knows that all readings of an absolute sensor are bad" => Fault(F::Encoder, Exactly(3));
+    SampleInvalid SimulatedPins "a board knows that all readings of an absolute sensor are bad" => Fault(F::Encoder, Exactly(3));
+    SensorWire Board "the data wire of an absolute sensor is open, or has a short circuit" => Fault(F::Encoder, Exactly(3));
+    MagnetMissing Board "the magnet of an absolute sensor is missing, which the sensor says" => Fault(F::Encoder, Exactly(3));
+    FrameBit Board "a bit of an absolute sensor's frame, parity and error flag included, is wrong in one of 5 to 50 ticks" => Bounded;
 }
 
 impl Defect {
@@ -147,7 +150,14 @@ impl Defect {
 
     /// Whether only an absolute sensor can have it.
     pub fn is_of_absolute(self) -> bool {
-        matches!(self, Self::SensorDead | Self::SensorBit | Self::SampleInvalid)
+        let without_frames =
+            matches!(self, Self::SensorDead | Self::SensorBit | Self::SampleInvalid | Self::SensorWire);
+        without_frames || self.is_of_frames()
+    }
+
+    /// Whether only an absolute sensor on a bus can have it.
+    pub fn is_of_frames(self) -> bool {
+        matches!(self, Self::MagnetMissing | Self::FrameBit)
     }
 
     /// Whether it is found by a threshold of the gain table: without thresholds it must be missed.
@@ -186,7 +196,7 @@ mod tests {
     #[test]
     fn a_defect_that_the_simulated_pins_can_have_needs_no_board() {
         let needs_board = Defect::ALL.iter().filter(|defect| defect.needs() == Needs::Board);
-        assert_eq!(needs_board.count(), 14);
+        assert_eq!(needs_board.count(), 17);
         assert_eq!(Defect::EncoderWireOpen.needs(), Needs::Nothing);
     }
 }

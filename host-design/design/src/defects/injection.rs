@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright::control::encoder::AbsoluteSensor;
+use upright::control::encoder::{AbsoluteSensor, is_at_end};
 use upright::protocol::frame::DELIMITER;
 use upright::protocol::message::{Command, Request};
 use upright::protocol::simulated_pins::BAD_SAMPLE;
@@ -58,6 +58,8 @@ struct AbsoluteReading {
     bits: u32,
     /// Its counter for a count of 0.
     at_zero: u32,
+    /// Whether its counter is its reading, which is bad at the ends of the range.
+    is_potentiometer: bool,
 }
 
 impl AbsoluteReading {
@@ -66,12 +68,19 @@ impl AbsoluteReading {
         let bits = table.limits.turn_counts[sensor].max(1).ilog2();
         let mut board = AbsoluteSensor::new(bits);
         let at_zero = counter.wrapping_sub(board.count(counter & ((1 << bits) - 1)));
-        Self { sensor: board, bits, at_zero }
+        let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
+        Self { sensor: board, bits, at_zero, is_potentiometer }
     }
 
     /// The counter for a reading, of which only the bits that the sensor has are taken.
     fn counter(&mut self, reading: u32) -> u32 {
-        self.at_zero.wrapping_add(self.sensor.count(reading & ((1 << self.bits) - 1)))
+        let reading = reading & ((1 << self.bits) - 1);
+        if self.is_potentiometer { reading } else { self.at_zero.wrapping_add(self.sensor.count(reading)) }
+    }
+
+    /// Whether a board knows that this counter is bad.
+    fn knows_bad(&self, counter: u32) -> bool {
+        self.is_potentiometer && is_at_end(counter, self.bits)
     }
 }
 
@@ -172,8 +181,7 @@ impl<'a> Injection<'a> {
                 shown.push(shows(sensor, moved(sensor) - lost as i64));
             }
             Defect::SensorDead | Defect::SensorBit => {
-                let reading = [truth[sensor], began[sensor]];
-                shown.push((sensor, self.of_reading(since, reading)));
+                shown.extend(self.of_reading(since, [truth[sensor], began[sensor]], inputs));
             }
             Defect::SampleInvalid => inputs.raw_counts[sensor] |= BAD_SAMPLE,
             Defect::SensorLate => {
@@ -189,17 +197,27 @@ impl<'a> Injection<'a> {
     }
 
     /// The counter that a board makes of the readings of a defective absolute sensor, whose counter would be `truth`,
-    /// and was `began` at the onset.
-    fn of_reading(&mut self, since: usize, [truth, began]: [u32; 2]) -> u32 {
+    /// and was `began` at the onset; none if the board knows that it is bad.
+    fn of_reading(
+        &mut self,
+        since: usize,
+        [truth, began]: [u32; 2],
+        inputs: &mut Pins,
+    ) -> Option<(usize, u32)> {
         let Trial { kind, sensor, sign, size, .. } = self.trial;
         let table = self.table;
         let board = self.board.get_or_insert_with(|| AbsoluteReading::of(table, sensor, began));
-        board.counter(match kind {
+        let counter = board.counter(match kind {
             Defect::SensorDead if sign > 0.0 => u32::MAX,
             Defect::SensorDead => 0,
             _ if since.is_multiple_of(every(size)) => truth ^ 1 << self.random.random_range(0..board.bits),
             _ => truth,
-        })
+        });
+        if board.knows_bad(counter) {
+            inputs.raw_counts[sensor] = counter | BAD_SAMPLE;
+            return None;
+        }
+        Some((sensor, counter))
     }
 
     /// Sets encoders to wrong counters; returns whether one is visibly wrong.

@@ -7,8 +7,9 @@ use super::Design;
 use crate::numerics::{Matrix, Real, exponential, spectral_radius};
 use crate::rig::Rig;
 
-/// Damping ratio of a step motor's resonance.
+/// Damping ratio of a step motor's resonance, and of a servo of second order.
 const DAMPING: f64 = 0.1;
+const SERVO_DAMPING: f64 = 0.7;
 /// Fastest and slowest drive that are tried (Hz), and the ratio from one to the next.
 const SPEEDS_HZ: [f64; 2] = [5e3, 0.1];
 const RATIO: f64 = 1.03;
@@ -21,7 +22,11 @@ pub struct DriveLimits {
     pub resonance_hz: Option<f64>,
     /// Least bandwidth of a servo that follows its speed with a lag of first order (Hz).
     pub bandwidth_hz: f64,
-    /// Largest one, for a design that makes up for a lag; none if a servo without lag is stable, too.
+    /// Least natural frequency of a servo that follows its speed as a system of second order with the damping ratio 0.7
+    /// (Hz); none if the design makes up for a lag.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_order_hz: Option<f64>,
+    /// Largest one of first order, for a design that makes up for a lag; none if a servo without lag is stable, too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_bandwidth_hz: Option<f64>,
 }
@@ -31,19 +36,23 @@ impl DriveLimits {
     /// that was designed for is not stable: the fastest one, or that with the file's bandwidth.
     pub fn of(rig: &Rig, design: &Design<f64>) -> Option<Self> {
         let drive = rig.actuator.acceleration.as_ref()?;
-        let servo = |rate: f64| is_stable(rig, design, [0.0, rate]).unwrap_or(false);
-        let motor = |rate: f64| is_stable(rig, design, [rate * rate, 2.0 * DAMPING * rate]).unwrap_or(false);
+        let of = |follower: Follower| is_stable(rig, design, follower).unwrap_or(false);
+        let servo = |rate: f64| of(Follower::Spring([0.0, rate]));
+        let motor = |rate: f64| of(Follower::Spring([rate * rate, 2.0 * DAMPING * rate]));
+        let second_order = |rate: f64| of(Follower::SecondOrder(rate));
         let [fastest_hz, slowest_hz] = SPEEDS_HZ;
         let Some(designed_hz) = drive.bandwidth_hz else {
             return Some(Self {
                 resonance_hz: Some(last_stable(fastest_hz, slowest_hz, motor)?),
                 bandwidth_hz: last_stable(fastest_hz, slowest_hz, servo)?,
+                second_order_hz: last_stable(fastest_hz, slowest_hz, second_order),
                 largest_bandwidth_hz: None,
             });
         };
         let largest_hz = last_stable(designed_hz, fastest_hz.max(designed_hz), servo)?;
         Some(Self {
             resonance_hz: None,
+            second_order_hz: None,
             bandwidth_hz: last_stable(designed_hz, slowest_hz.min(designed_hz), servo)?,
             largest_bandwidth_hz: Some(largest_hz).filter(|&largest_hz| largest_hz * RATIO < fastest_hz),
         })
@@ -64,38 +73,72 @@ fn last_stable(from_hz: f64, to_hz: f64, is_stable: impl Fn(f64) -> bool) -> Opt
     tried_hz.take_while(|hz| is_stable(core::f64::consts::TAU * hz)).last()
 }
 
-/// Whether the loop is stable if the drive gives the cart the acceleration
-/// `stiffness (x_c - x) + damping (v_c - v)` for the commanded position x_c and speed v_c.
+/// How a drive follows the commanded position x_c and speed v_c.
+#[derive(Debug, Clone, Copy)]
+enum Follower {
+    /// With the acceleration `stiffness (x_c - x) + damping (v_c - v)`.
+    Spring([f64; 2]),
+    /// With an acceleration a that follows as `ȧ = ω² (v_c - v) - 2 ζ ω a`.
+    SecondOrder(f64),
+}
+
+impl Follower {
+    /// The plant with further states: a (with a spring, one that decays), x_c and v_c.
+    fn moving(self, design: &Design<f64>) -> Matrix<f64> {
+        let s = design.a.rows();
+        let (acceleration, x_c, v_c) = (s, s + 1, s + 2);
+        let b = design.b.above(&Matrix::zeros(3, 1));
+        let mut follows = Matrix::zeros(1, s + 3);
+        let mut moving = Matrix::zeros(s + 3, s + 3).with_block(0, 0, &design.a);
+        moving[(acceleration, acceleration)] = -1.0;
+        let depends_on_position = match self {
+            Self::Spring([stiffness, damping]) => {
+                for (column, gain) in [(0, -stiffness), (1, -damping), (x_c, stiffness), (v_c, damping)] {
+                    follows[(0, column)] = gain;
+                }
+                stiffness != 0.0
+            }
+            Self::SecondOrder(rate) => {
+                follows[(0, acceleration)] = 1.0;
+                let gains =
+                    [(1, -rate * rate), (v_c, rate * rate), (acceleration, -2.0 * SERVO_DAMPING * rate)];
+                for (column, gain) in gains {
+                    moving[(acceleration, column)] = gain;
+                }
+                false
+            }
+        };
+        moving = &moving + &(&b * &follows);
+        moving[(x_c, v_c)] = 1.0;
+        if !depends_on_position {
+            // Nothing depends on the real position: its own integrator must not look like a loop that is not stable.
+            moving[(0, 0)] = -1.0;
+        }
+        moving
+    }
+}
+
+/// Whether the loop is stable with this drive.
 ///
-/// The state is the plant's, and the observer's prediction x̂⁻. In each tick, with x̂ the corrected estimate and
-/// `a = -K x̂`, the command begins at `x̂_0 + lag x̂_1` and has the speed `x̂_1 + lead a`.
-fn is_stable(rig: &Rig, design: &Design<f64>, [stiffness, damping]: [f64; 2]) -> Option<bool> {
+/// The state is the plant's, the drive's, and the observer's prediction x̂⁻. In each tick, with x̂ the corrected
+/// estimate and `a = -K x̂`, the command begins at `x̂_0 + lag x̂_1` and has the speed `x̂_1 + lead a`.
+fn is_stable(rig: &Rig, design: &Design<f64>, follower: Follower) -> Option<bool> {
     let (law, kalman) = (design.sampled.lqr.as_ref()?, design.kalman.as_ref()?);
     let (s, period_s) = (design.a.rows(), rig.tick.period_s);
-    let mut follows = Matrix::zeros(1, s + 2);
-    for (column, gain) in [(0, -stiffness), (1, -damping), (s, stiffness), (s + 1, damping)] {
-        follows[(0, column)] = gain;
-    }
-    let mut moving = Matrix::zeros(s + 2, s + 2).with_block(0, 0, &design.a);
-    moving = &moving + &(&design.b.above(&Matrix::zeros(2, 1)) * &follows);
-    moving[(s, s + 1)] = 1.0;
-    if stiffness == 0.0 {
-        // Nothing depends on the real position: its own integrator must not look like a loop that is not stable.
-        moving[(0, 0)] = -1.0;
-    }
-    let after = exponential(&moving.scaled(&period_s));
-    // Rows of x̂ and of the command's speed, from the plant's state and x̂⁻.
-    let sensors = rig.sensors();
-    let c = Matrix::from_fn(sensors.len(), s, |i, j| f64::from(u8::from(sensors[i].state == j)));
-    let corrected = &kalman.l_filter * &c;
-    let estimate = corrected.beside(&(&Matrix::identity(s) - &corrected));
+    let real = s + 1;
+    let after = exponential(&follower.moving(design).scaled(&period_s));
+    // Rows of x̂ and of the command's speed, from the real state and x̂⁻.
+    let corrected = &kalman.l_filter * &rig.measurement();
+    let estimate = corrected.beside(&Matrix::zeros(s, 1)).beside(&(&Matrix::identity(s) - &corrected));
     let drive = rig.actuator.acceleration.as_ref()?;
     let mut speed = law.k.scaled(&-drive.lead_s(period_s));
     speed[(0, 1)] += 1.0;
     let speed = &speed * &estimate;
-    let begin = &estimate.block(0, 0, 1, 2 * s) + &estimate.block(1, 0, 1, 2 * s).scaled(&drive.lag_s());
-    let plant = after.block(0, 0, s, s).beside(&Matrix::zeros(s, s));
-    let plant = &(&plant + &(&after.block(0, s, s, 1) * &begin)) + &(&after.block(0, s + 1, s, 1) * &speed);
+    let row = |row: usize| estimate.block(row, 0, 1, real + s);
+    let begin = &row(0) + &row(1).scaled(&drive.lag_s());
+    let plant = after.block(0, 0, real, real).beside(&Matrix::zeros(real, s));
+    let plant = &(&plant + &(&after.block(0, real, real, 1) * &begin))
+        + &(&after.block(0, real + 1, real, 1) * &speed);
     let predicted = &(&design.ad - &(&design.bd * &law.k)) * &estimate;
     Some(spectral_radius(&plant.above(&predicted)).ok()? < f64::one())
 }
@@ -107,6 +150,9 @@ impl fmt::Display for DriveLimits {
             write!(f, "resonance at least {resonance_hz:.1} Hz, or ")?;
         }
         write!(f, "a servo with a bandwidth of at least {:.1} Hz", self.bandwidth_hz)?;
+        if let Some(second_order_hz) = self.second_order_hz {
+            write!(f, " ({second_order_hz:.1} Hz of second order)")?;
+        }
         self.largest_bandwidth_hz.map_or(Ok(()), |largest_hz| write!(f, ", at most {largest_hz:.1} Hz"))
     }
 }

@@ -50,12 +50,7 @@ pub(super) fn kalman<R: Real>(
     let q = integrated_quadratic(&a.transpose(), &spread, period);
     let sensors = rig.sensors();
     let steps: Vec<R> = sensors.iter().map(Sensor::step).collect();
-    let c =
-        Matrix::from_fn(
-            sensors.len(),
-            a.cols(),
-            |i, j| if sensors[i].state == j { R::one() } else { R::zero() },
-        );
+    let c = rig.measurement();
     let mut r = Matrix::from_diagonal(&sensor_variances(rig, &steps));
     if rig.actuator.input() == CartInput::Acceleration {
         let measured: Vec<usize> = sensors.iter().map(|sensor| sensor.state).collect();

@@ -131,7 +131,7 @@ impl UnitPush {
 struct PredictionError<'a> {
     ad: &'a Matrix<f64>,
     l_filter: &'a Matrix<f64>,
-    measured: Vec<usize>,
+    c: Matrix<f64>,
     /// Error of the predicted state.
     error: Vec<f64>,
     /// What the sensors show of it (m or rad).
@@ -144,16 +144,14 @@ impl<'a> PredictionError<'a> {
     /// No error.
     fn new(pushed_loop: &PushedLoop<'a>, kalman: &'a Kalman<f64>) -> Self {
         let (ad, l_filter) = (&pushed_loop.design.ad, &kalman.l_filter);
-        let measured: Vec<usize> = pushed_loop.rig.sensors().iter().map(|sensor| sensor.state).collect();
-        let (zeros, seen) = (vec![0.0; ad.rows()], vec![0.0; measured.len()]);
-        Self { ad, l_filter, measured, error: zeros.clone(), seen, corrected: zeros }
+        let c = pushed_loop.rig.measurement();
+        let (zeros, seen) = (vec![0.0; ad.rows()], vec![0.0; c.rows()]);
+        Self { ad, l_filter, c, error: zeros.clone(), seen, corrected: zeros }
     }
 
     /// The sensors show the error.
     fn see(&mut self) {
-        for sensor in 0..self.measured.len() {
-            self.seen[sensor] = self.error[self.measured[sensor]];
-        }
+        self.c.times_column(&self.error, &mut self.seen);
     }
 
     /// A tick passes: the estimate is corrected by what was seen, and the error moves on with the state.

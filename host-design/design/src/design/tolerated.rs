@@ -59,9 +59,9 @@ impl Tolerated {
             let zero = &Matrix::identity(states) - &design.ad;
             inputs.push((zero.block(0, angle, states, 1), tolerances.homing_error_rad));
         }
-        let measured: Vec<usize> = rig.sensors().iter().map(|sensor| sensor.state).collect();
+        let c = rig.measurement();
         for (input, largest) in inputs.into_iter().filter(|(_, largest)| *largest > 0.0) {
-            bounds.add((input, largest), design, kalman, &measured, keep);
+            bounds.add((input, largest), design, kalman, &c, keep);
         }
         Some(bounds)
     }
@@ -72,18 +72,19 @@ impl Tolerated {
         (input, largest): (Matrix<f64>, f64),
         design: &Design<f64>,
         kalman: &Kalman<f64>,
-        measured: &[usize],
+        c: &Matrix<f64>,
         keep: f64,
     ) {
         let end = DECAYED * input.norm();
         let mut error = input;
-        let mut sums = vec![0.0; measured.len()];
+        let mut sums = vec![0.0; c.rows()];
         for _ in 0..LONGEST {
-            let seen: Vec<f64> = measured.iter().map(|&state| error[(state, 0)]).collect();
-            let correction = &kalman.l_filter * &Matrix::column(&seen);
-            for (sensor, &state) in measured.iter().enumerate() {
-                self.innovation[sensor] += largest * seen[sensor].abs();
-                sums[sensor] = keep * sums[sensor] + correction[(state, 0)];
+            let seen = c * &error;
+            let correction = &kalman.l_filter * &seen;
+            let corrected = c * &correction;
+            for sensor in 0..c.rows() {
+                self.innovation[sensor] += largest * seen[(sensor, 0)].abs();
+                sums[sensor] = keep * sums[sensor] + corrected[(sensor, 0)];
                 self.corrected[sensor] += largest * sums[sensor].abs();
             }
             error = &design.ad * &(&error - &correction);

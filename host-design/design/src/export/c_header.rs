@@ -91,6 +91,8 @@ fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Re
     define("STATES", table.states().to_string())?;
     define("SENSORS", table.sensors().to_string())?;
     define("OUTPUT", table.output.to_string())?;
+    let is_late = table.observer.as_ref().is_some_and(has_delay);
+    define("HAS_DELAY", u8::from(is_late).to_string())?;
     define("HAS_PENDING", u8::from(table.pending_acts != 0.0).to_string())?;
     define("LAWS", laws.len().to_string())?;
     for (index, law) in laws.into_iter().enumerate() {
@@ -129,6 +131,11 @@ fn condition(fault: Fault) -> &'static str {
     }
 }
 
+/// Whether a sensor's reading is old.
+fn has_delay(observer: &WidestObserver) -> bool {
+    observer.delay_s.iter().any(|&delay_s| delay_s != 0.0)
+}
+
 struct Pattern<'a>(&'a TableValues);
 
 impl WithSize for Pattern<'_> {
@@ -158,6 +165,9 @@ fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
     out.columns("ad", observer.ad.data.0[..states].iter().map(|values| column(values)));
     out.floats("bd", column(&observer.bd.data.0[0]));
     out.columns("l", observer.l.data.0[..sensors].iter().map(|values| column(values)));
+    if has_delay(observer) {
+        out.floats("delay_s", observer.delay_s.data.0[0][..sensors].iter().copied());
+    }
     out.floats("step", observer.step.data.0[0][..sensors].iter().copied());
     if let Some(friction) = &table.friction {
         let laws: Vec<usize> = table.laws.present().map(|(law, _)| 2 + law as usize).collect();

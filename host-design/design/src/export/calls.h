@@ -134,7 +134,7 @@ UPRIGHT_CALL upright_drive upright_control(upright_controller *c, const uint32_t
 #endif
     upright_govern(c, upright_gains(c)->setpoint_step_m);
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
-        c->innovation[i] = y[i] - c->estimate[upright_table.measured[i]];
+        c->innovation[i] = y[i] - upright_measured(c, i);
     }
     uint8_t sensor = 0;
     upright_fault of_sensors = upright_test(c, y, &sensor);
@@ -183,7 +183,7 @@ UPRIGHT_CALL void upright_predict(upright_controller *c)
     c->lacks_force = upright_lacks_force(c);
 #else
     for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
-        c->sensors[i].corrected = c->estimate[upright_table.measured[i]];
+        c->sensors[i].corrected = upright_measured(c, i);
     }
 #endif
     const float *a = upright_table.motor_a, *b = upright_table.motor_b;

@@ -66,6 +66,9 @@ typedef struct {
     float ad[UPRIGHT_STATES][UPRIGHT_STATES];
     float bd[UPRIGHT_STATES];
     float l[UPRIGHT_SENSORS][UPRIGHT_STATES];
+#if UPRIGHT_HAS_DELAY
+    float delay_s[UPRIGHT_SENSORS]; /* age of each sensor's reading */
+#endif
     float step[UPRIGHT_SENSORS];
 #if UPRIGHT_HAS_FRICTION
     /* Known Coulomb friction of each axis: bound, slope, force on the cart with each law; effect on the states. */

@@ -121,6 +121,17 @@ static inline float upright_speed(const upright_controller *c)
 #endif
 }
 
+/* What sensor i measures of the estimate (m or rad). */
+static inline float upright_measured(const upright_controller *c, uint8_t i)
+{
+    uint32_t state = upright_table.measured[i];
+#if UPRIGHT_HAS_DELAY
+    return c->estimate[state] - upright_table.delay_s[i] * (state + 1 < UPRIGHT_STATES ? c->estimate[state + 1] : 0.0f);
+#else
+    return c->estimate[state];
+#endif
+}
+
 /* Takes new readings of the counters; `y` gets the positions (m or rad). */
 static inline void upright_measure(upright_controller *c, const uint32_t *raw, float *y)
 {

@@ -128,6 +128,9 @@ impl Record {
             };
             (tick.drive != OFF).then_some(drive)
         };
+        // An old reading belongs to an earlier tick, or is between two.
+        let late: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.delay_s / rig.tick.period_s).collect();
+        let most_late = late.iter().fold(0.0f64, |most, late| most.max(late.ceil())) as usize;
         let (mut from, is_moved) = (0, self.is_moved);
         for to in 1..=ticks.len() {
             // A drive that is off lets go of the cart, and its pulses no longer tell where that is.
@@ -139,9 +142,17 @@ impl Record {
                 continue;
             }
             if (to - from) as f64 * rig.tick.period_s >= SHORTEST_PIECE_S {
+                let to = to - most_late;
                 let samples = (from..to).step_by(self.stride);
-                let rows = samples.flat_map(|index| &deviations[index * self.channels..][..self.channels]);
-                let y = rows.enumerate().map(|(i, &counts)| counts as f64 * self.steps[i % self.channels]);
+                let positions =
+                    samples.flat_map(|index| late.iter().enumerate().map(move |late| (index, late)));
+                let y = positions.map(|(index, (channel, late))| {
+                    let read = |index: usize| deviations[index * self.channels + channel] as f64;
+                    let first = index + *late as usize;
+                    let further =
+                        if late.fract() > 0.0 { late.fract() * (read(first + 1) - read(first)) } else { 0.0 };
+                    (read(first) + further) * self.steps[channel]
+                });
                 self.pieces.push(Piece { y: y.collect(), drive: (from..to).map(drive).collect() });
             }
             from = to;

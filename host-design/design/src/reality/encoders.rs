@@ -26,15 +26,18 @@ struct Joint {
 }
 
 impl RealEncoders {
-    /// The encoders of a rig; none if they have no error.
+    /// The encoders of a rig; none if they have neither error nor delay.
     pub fn of(rig: &Rig) -> Option<Self> {
         let errors = &rig.reality.sensors;
         let SensorErrors { homing_error_rad, eccentricity_rad, twice_per_turn_rad, sensor_delay_s, .. } =
             errors;
-        [homing_error_rad, eccentricity_rad, twice_per_turn_rad, sensor_delay_s]
-            .into_iter()
-            .any(PerJoint::is_any)
-            .then(|| Self { joints: (0..rig.links()).map(|joint| Joint::of(errors, joint)).collect() })
+        let stated_s: Vec<f64> =
+            rig.chain().iter().flat_map(|chain| &chain.links).map(|link| link.sensor_delay_s).collect();
+        let errors_of_joints = [homing_error_rad, eccentricity_rad, twice_per_turn_rad, sensor_delay_s];
+        let has_error = errors_of_joints.into_iter().any(PerJoint::is_any)
+            || stated_s.iter().any(|&delay_s| delay_s > 0.0);
+        let joint = |(joint, delay_s)| Joint::of(errors, joint, delay_s);
+        has_error.then(|| Self { joints: stated_s.into_iter().enumerate().map(joint).collect() })
     }
 
     /// Measured value of the position with this index in `state`. Only angles have errors.
@@ -48,14 +51,14 @@ impl RealEncoders {
 }
 
 impl Joint {
-    fn of(errors: &SensorErrors, joint: usize) -> Self {
+    fn of(errors: &SensorErrors, joint: usize, stated_delay_s: f64) -> Self {
         let once = [errors.eccentricity_rad.of(joint), errors.eccentricity_phase_rad.of(joint)];
         let twice = [errors.twice_per_turn_rad.of(joint), errors.twice_per_turn_phase_rad.of(joint)];
         let mut of = Self {
             zero_error: errors.homing_error_rad.of(joint),
             harmonics: [once, twice],
             at_homing: 0.0,
-            delay_s: errors.sensor_delay_s.of(joint),
+            delay_s: stated_delay_s + errors.sensor_delay_s.of(joint),
         };
         of.at_homing = of.periodic(if joint == 0 { PI } else { 0.0 });
         of

@@ -207,12 +207,18 @@ impl Description {
             Some(LinkEncoder::CountsPerRev(counts)) => {
                 self.value("encoder step", TAU / counts, "rad", &format!("(2π / {})", digits(counts)));
             }
-            Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad }) => {
+            Some(LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad }) => {
                 self.row(&LINK, given("sensor_bits"), &[f64::from(bits)]);
+                if let Some(travel_rad) = travel_rad {
+                    self.row(&LINK, given("sensor_travel_rad"), &[travel_rad]);
+                }
                 self.row(&LINK, given("sensor_zero_counts"), &[f64::from(zero_counts)]);
                 self.row(&LINK, given("sensor_noise_rad"), &[noise_rad]);
             }
             None => self.note("encoder step", "none"),
+        }
+        if link.sensor_delay_s > 0.0 {
+            self.row(&LINK, given("sensor_delay_s"), &[link.sensor_delay_s]);
         }
     }
 

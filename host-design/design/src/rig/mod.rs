@@ -60,5 +60,5 @@ pub use sections::swing_up::SwingUpRules;
 pub use sections::tick::Tick;
 pub use sections::verify::Requirements;
 pub use sections::{SECTIONS, TOP};
-pub use sensors::Sensor;
+pub use sensors::{AbsoluteRange, Sensor};
 pub use value::PerJoint;

@@ -78,6 +78,11 @@ impl Rule {
         accepts: "a whole number from 12 to 18",
         admits: |x| x.iter().all(|&x| (12.0..=18.0).contains(&x) && x.fract() == 0.0),
     };
+    /// Angle that a potentiometer reads.
+    pub(super) const TRAVEL: Rule = Rule {
+        accepts: "a number from 3.7 to 6.2 (rad)",
+        admits: |x| x.iter().all(|&x| (3.7..=6.2).contains(&x)),
+    };
     /// Whole and not negative.
     pub(super) const WHOLE: Rule =
         Rule { accepts: "a whole number >= 0", admits: |x| x.iter().all(|&x| x >= 0.0 && x.fract() == 0.0) };

@@ -1,11 +1,13 @@
 //! The sensors of a rig.
 
-use upright::control::encoder::AbsoluteSensor;
+use std::f64::consts::{PI, TAU};
+
+use upright::control::encoder::{AbsoluteSensor, is_at_end};
 
 use super::description::Rig;
 use super::sections::chain::PlantDescription;
 use super::sections::link::LinkEncoder;
-use crate::numerics::Real;
+use crate::numerics::{Matrix, Real};
 
 /// A sensor that measures one state in discrete steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,10 +16,54 @@ pub struct Sensor {
     pub state: usize,
     /// Noise besides rounding, root mean square (unit of the state).
     pub noise: f64,
-    /// If it is an absolute sensor of an angle, bits per turn and reading while the links hang (counts), of those that
-    /// are used.
-    pub absolute: Option<[u32; 2]>,
+    /// How it reads, if it is an absolute sensor of an angle.
+    pub absolute: Option<AbsoluteRange>,
+    /// Age of its reading at the tick (s).
+    pub delay_s: f64,
     resolution: Resolution,
+}
+
+/// How an absolute sensor of an angle reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AbsoluteRange {
+    /// Bits that are used.
+    pub bits: u32,
+    /// Reading while the links hang (counts).
+    pub zero: u32,
+    /// Counts in a turn. A potentiometer reads only the first 2^bits of them.
+    pub turn: u32,
+    /// Position while the links hang (counts): the first link hangs half a turn from position 0.
+    pub rest: i64,
+}
+
+impl AbsoluteRange {
+    /// The reading at this position (counts); that of an open wire in the dead band of a potentiometer.
+    pub fn reading(&self, position: i64) -> u32 {
+        let reading = (i64::from(self.zero) + position - self.rest).rem_euclid(self.turn.into()) as u32;
+        if reading < 1 << self.bits { reading } else { 0 }
+    }
+
+    /// Whether it does not read a whole turn.
+    pub fn has_dead_band(&self) -> bool {
+        self.turn != 1 << self.bits
+    }
+
+    /// The lowest and the highest reading while the links hang with which no reading at these positions (counts) is in
+    /// the dead band.
+    pub fn zeros_that_read(&self, positions: impl Iterator<Item = i64> + Clone) -> Option<[u32; 2]> {
+        let works = |zero: &u32| {
+            let other = Self { zero: *zero, ..*self };
+            !positions.clone().any(|position| other.is_dead(other.reading(position)))
+        };
+        let mut zeros = (0..1u32 << self.bits).filter(works);
+        let low = zeros.next()?;
+        Some([low, zeros.last().unwrap_or(low)])
+    }
+
+    /// Whether this reading is in the dead band of a potentiometer, or so near that it is not used.
+    pub fn is_dead(&self, reading: u32) -> bool {
+        self.has_dead_band() && is_at_end(reading, self.bits)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +75,7 @@ enum Resolution {
 impl Sensor {
     /// A sensor of this state that counts steps of this size.
     const fn of_step(state: usize, step: f64) -> Self {
-        Self { state, noise: 0.0, absolute: None, resolution: Resolution::Step(step) }
+        Self { state, noise: 0.0, absolute: None, delay_s: 0.0, resolution: Resolution::Step(step) }
     }
 
     fn of_link(state: usize, encoder: LinkEncoder) -> Self {
@@ -38,11 +84,19 @@ impl Sensor {
             LinkEncoder::CountsPerRev(counts) => {
                 Self { resolution: Resolution::CountsPerRev(counts), ..Self::of_step(state, 0.0) }
             }
-            LinkEncoder::Absolute { bits, zero_counts, noise_rad } => {
+            LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad } => {
                 let used = u32::from(bits).min(AbsoluteSensor::BITS);
                 let zero = zero_counts >> (u32::from(bits) - used);
-                let resolution = Resolution::CountsPerRev(f64::from(1u32 << used));
-                Self { state, noise: noise_rad, absolute: Some([used, zero]), resolution }
+                let readings = f64::from(1u32 << used);
+                let resolution = match travel_rad {
+                    None => Resolution::CountsPerRev(readings),
+                    Some(travel_rad) => Resolution::Step(travel_rad / readings),
+                };
+                let mut sensor = Self { noise: noise_rad, resolution, ..Self::of_step(state, 0.0) };
+                let step: f64 = sensor.step();
+                let (turn, rest) = ((TAU / step).round() as u32, if state == 2 { PI / step } else { 0.0 });
+                sensor.absolute = Some(AbsoluteRange { bits: used, zero, turn, rest: rest.round() as i64 });
+                sensor
             }
         }
     }
@@ -63,6 +117,17 @@ impl Sensor {
 }
 
 impl Rig {
+    /// C of `y = C x` for [`sensors`](Self::sensors): each measures its state, less the next one, its rate, by the age
+    /// of the reading. This is exact to first order in that age.
+    pub fn measurement<R: Real>(&self) -> Matrix<R> {
+        let sensors = self.sensors();
+        Matrix::from_fn(sensors.len(), self.states(), |i, j| match &sensors[i] {
+            sensor if sensor.state == j => R::one(),
+            sensor if sensor.state + 1 == j => R::from_f64(-sensor.delay_s),
+            _ => R::zero(),
+        })
+    }
+
     /// The sensors with a resolution in the rig file, in the order of the states: the cart's and the links' encoders,
     /// or the measured states of a model.
     pub fn sensors(&self) -> Vec<Sensor> {
@@ -72,7 +137,8 @@ impl Rig {
                 let step_m = self.actuator.acceleration.as_ref().map(|drive| drive.step_m);
                 let cart = step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_step(0, step));
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {
-                    description.encoder.map(|encoder| Sensor::of_link(2 + 2 * link, encoder))
+                    let sensor = Sensor::of_link(2 + 2 * link, description.encoder?);
+                    Some(Sensor { delay_s: description.sensor_delay_s, ..sensor })
                 });
                 cart.into_iter().chain(links).collect()
             }

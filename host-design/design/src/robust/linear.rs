@@ -95,7 +95,7 @@ impl<'a> LinearPlants<'a> {
             let plant = continuous_plant::<f64>(&wrong_masses(rig, tolerances.mass_percent, &factors))?;
             if rig.actuator.input().is_force() {
                 let (a, b) = with_lag(&plant.a, &plant.b, lag_s(rig));
-                return Ok(PlantModel::delayed(&a, &b, period_s, delay_ticks, &measured(rig)));
+                return Ok(PlantModel::delayed(&a, &b, period_s, delay_ticks, &rig.measurement()));
             }
             Ok(held(rig, &Hold::of(rig).sampled(&plant.a, &plant.b, &period_s)))
         };
@@ -120,11 +120,6 @@ impl<'a> LinearPlants<'a> {
     }
 }
 
-/// State that each sensor measures.
-fn measured(rig: &Rig) -> Vec<usize> {
-    rig.sensors().iter().map(|sensor| sensor.state).collect()
-}
-
 /// The plant sampled at its tick. The cart of a drive with pulses is where the observer takes it to be: it decays
 /// within a tick, so that it does not look like two poles at 1.
 fn held(rig: &Rig, (ad, bd): &(Matrix<f64>, Matrix<f64>)) -> PlantModel<f64> {
@@ -133,5 +128,5 @@ fn held(rig: &Rig, (ad, bd): &(Matrix<f64>, Matrix<f64>)) -> PlantModel<f64> {
         let entry = |row, column| if row < seen_from { 0.0 } else { matrix[(row, column)] };
         Matrix::from_fn(matrix.rows(), matrix.cols(), entry)
     };
-    PlantModel::held(&seen(ad), &seen(bd), usize::from(rig.tick.delay_ticks), &measured(rig))
+    PlantModel::held(&seen(ad), &seen(bd), usize::from(rig.tick.delay_ticks), &rig.measurement())
 }

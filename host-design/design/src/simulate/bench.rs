@@ -5,17 +5,15 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 
 use super::error::SimulationError;
 use super::scenario::Scenario;
 use super::sensor::{SimulatedSensor, nearest};
+use super::servo::Servo;
 use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
 use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
-use crate::rig::{AccelerationDrive, Chain, PlantDescription, Rig};
-
-/// Parts of a servo's lag in which the acceleration of the cart is taken as constant, and the most of a tick.
-const PARTS_OF_A_LAG: f64 = 10.0;
-const MOST_PARTS: f64 = 1000.0;
+use crate::rig::{Chain, PlantDescription, Rig};
 
 /// What is wrong with a drive that takes pulses. The board counts its pulses whatever it does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,8 +40,8 @@ pub struct Bench {
     step_defect: Option<StepDefect>,
     /// Its motor, unless it goes where its pulses say.
     step_motor: Option<StepMotor>,
-    /// Its lag (s), if it is a servo that follows late.
-    servo_lag_s: Option<f64>,
+    /// A servo that follows late.
+    servo: Option<Servo>,
     driver: Option<Driver>,
     timing: Timing,
     encoders: Option<RealEncoders>,
@@ -86,17 +84,18 @@ impl Bench {
         let finite =
             |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
         let step_m = rig.actuator.acceleration.as_ref().map(|drive| drive.step_m);
+        let servo = Servo::of(rig);
         Ok(Self {
             torques: vec![0.0; plant.disturbances()],
             pull_n_m: vec![0.0; plant.disturbances()],
             plant,
             motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
             step_m,
-            pulses: pulses_at(&scenario.start, step_m, servo_lag_s(rig)),
+            pulses: pulses_at(&scenario.start, step_m, servo.as_ref()),
             missed: 0,
             step_defect: None,
             step_motor,
-            servo_lag_s: servo_lag_s(rig),
+            servo,
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
@@ -130,7 +129,8 @@ impl Bench {
     pub fn hold(&mut self, state: &[f64]) {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
-        self.pulses = pulses_at(state, self.step_m, self.servo_lag_s);
+        self.servo.iter_mut().for_each(Servo::rest);
+        self.pulses = pulses_at(state, self.step_m, self.servo.as_ref());
         self.missed = 0;
     }
 
@@ -159,7 +159,8 @@ impl Bench {
         if sensor == 0 { CounterWidth::Bits32 } else { CounterWidth::Bits16 }
     }
 
-    /// Writes the readings of the hardware counters into `counters`; entries without a sensor keep their value.
+    /// Writes the readings of the hardware counters into `counters`, with [`BAD_SAMPLE`] in the dead band of a
+    /// potentiometer; entries without a sensor keep their value.
     pub fn read_counters(&mut self, counters: &mut [u32]) {
         for (index, (counter, sensor)) in counters.iter_mut().zip(&mut self.sensors).enumerate() {
             if index == 0 && self.step_m.is_some() {
@@ -175,7 +176,8 @@ impl Bench {
                 let normal: f64 = StandardNormal.sample(&mut self.random);
                 position += sensor.noise * normal;
             }
-            *counter = Self::reading(index, sensor.count(position, self.counter_start));
+            let count = sensor.count(position, self.counter_start);
+            *counter = Self::reading(index, count) | if sensor.is_dead(count) { BAD_SAMPLE } else { 0 };
         }
     }
 
@@ -259,8 +261,9 @@ impl Bench {
         self.missed += missed as i64;
         let speed = arrive * step_m / self.period_s;
         let Some(motor) = &self.step_motor else {
-            if let Some(lag_s) = self.servo_lag_s {
-                self.follow(speed, lag_s);
+            if let Some(mut servo) = self.servo.take() {
+                self.follow(speed, &mut servo);
+                self.servo = Some(servo);
                 return;
             }
             self.plant.set_cart_speed(speed);
@@ -282,13 +285,12 @@ impl Bench {
         }
     }
 
-    /// Simulates a tick in which the cart approaches a speed (m/s) with a lag of first order (s).
-    fn follow(&mut self, speed: f64, lag_s: f64) {
-        let parts =
-            (PARTS_OF_A_LAG * self.period_s / lag_s).ceil().clamp(self.substeps as f64, MOST_PARTS) as usize;
+    /// Simulates a tick in which the cart approaches a speed (m/s) as its servo does.
+    fn follow(&mut self, speed: f64, servo: &mut Servo) {
+        let parts = servo.parts(self.period_s, self.substeps);
         let part_s = self.period_s / parts as f64;
         for _ in 0..parts {
-            let approached = -libm::expm1(-part_s / lag_s) * (speed - self.state[1]);
+            let approached = servo.approach(self.state[1] - speed, part_s);
             self.plant.advance(approached / part_s, &self.torques, part_s, 1);
             self.plant.write_state(&mut self.state);
         }
@@ -383,13 +385,7 @@ impl Bench {
 }
 
 /// The pulses that have been given to a drive whose cart is in this state: a servo's cart is behind its command.
-fn pulses_at(state: &[f64], step_m: Option<f64>, servo_lag_s: Option<f64>) -> i64 {
-    step_m
-        .map_or(0, |step_m| nearest((state[0] + servo_lag_s.map_or(0.0, |lag_s| lag_s * state[1])) / step_m))
-}
-
-/// The lag (s) of a servo in the real machine; none if it follows at once, or if its motor is described.
-fn servo_lag_s(rig: &Rig) -> Option<f64> {
-    let described = rig.actuator.acceleration.as_ref()?;
-    rig.reality.step_motor.bandwidth_hz.or(described.bandwidth_hz).map(AccelerationDrive::lag_at)
+fn pulses_at(state: &[f64], step_m: Option<f64>, servo: Option<&Servo>) -> i64 {
+    let lag_s = servo.map_or(0.0, Servo::lag_s);
+    step_m.map_or(0, |step_m| nearest((state[0] + lag_s * state[1]) / step_m))
 }

@@ -25,6 +25,7 @@ mod lockstep;
 mod motion;
 mod scenario;
 mod sensor;
+mod servo;
 mod summary;
 mod trace;
 

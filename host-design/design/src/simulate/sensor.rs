@@ -1,10 +1,8 @@
 //! A sensor of the simulated rig, up to the count that the firmware reads.
 
-use std::f64::consts::PI;
-
 use upright::control::encoder::AbsoluteSensor;
 
-use crate::rig::{Rig, Sensor};
+use crate::rig::{AbsoluteRange, Rig, Sensor};
 
 /// A sensor as the board reads it: an encoder with its counter, or an absolute sensor.
 pub(super) struct SimulatedSensor {
@@ -18,10 +16,8 @@ pub(super) struct SimulatedSensor {
 
 /// An absolute sensor, and what the board makes of its readings.
 struct Absolute {
-    /// Readings in a turn.
-    turn: u32,
-    /// Reading at position 0, and the count that the board has made of it at power-up.
-    zero: u32,
+    range: AbsoluteRange,
+    /// The count that the board has made of the reading at position 0, at power-up.
     at_zero: u32,
     board: AbsoluteSensor,
 }
@@ -34,23 +30,28 @@ impl SimulatedSensor {
 
     fn of(sensor: &Sensor) -> Self {
         let step: f64 = sensor.step();
-        let absolute = sensor.absolute.map(|[bits, hanging]| {
-            // The first link hangs half a turn from position 0.
-            let rest = if sensor.state == 2 { nearest(PI / step) } else { 0 };
-            let (turn, mut board) = (1 << bits, AbsoluteSensor::new(bits));
-            let zero = hanging.wrapping_sub(rest as u32) % turn;
-            Absolute { turn, zero, at_zero: board.count(zero), board }
+        let absolute = sensor.absolute.map(|range| {
+            let mut board = AbsoluteSensor::new(range.bits);
+            Absolute { range, at_zero: board.count(range.reading(0)), board }
         });
         Self { state: sensor.state, noise: sensor.noise, step, absolute }
     }
 
     /// The count at this position (unit of the state), noise included. A counter reads `counter_start` at 0.
     pub(super) fn count(&mut self, position: f64, counter_start: u32) -> u32 {
-        let counts = nearest(position / self.step) as u32;
+        let counts = nearest(position / self.step);
         match &mut self.absolute {
-            None => counter_start.wrapping_add(counts),
-            Some(absolute) => absolute.board.count(absolute.zero.wrapping_add(counts) % absolute.turn),
+            None => counter_start.wrapping_add(counts as u32),
+            Some(Absolute { range, board, .. }) => {
+                let reading = range.reading(counts);
+                if range.has_dead_band() { reading } else { board.count(reading) }
+            }
         }
+    }
+
+    /// Whether a count is one in the dead band.
+    pub(super) fn is_dead(&self, count: u32) -> bool {
+        self.absolute.as_ref().is_some_and(|absolute| absolute.range.is_dead(count))
     }
 
     /// The count at position 0.

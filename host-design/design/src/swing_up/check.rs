@@ -7,6 +7,7 @@ use super::setting::Setting;
 use crate::motion::{PlannedMotion, Transition};
 use crate::plant::chain_plant;
 use crate::plant::reference::{Tolerance, integrate};
+use crate::rig::AbsoluteRange;
 
 /// Largest difference that the adaptive integrator may find in a tick, in the units of the states.
 const DRIFT: f64 = 5e-8;
@@ -36,7 +37,7 @@ pub struct Peaks {
 /// Checks `motion`: its ends, the equations of motion, and the limits of the machine.
 ///
 /// # Errors
-/// [`SwingUpError::Broken`] with the condition that does not hold.
+/// [`SwingUpError::Broken`] with the condition that does not hold, or [`SwingUpError::DeadBand`].
 pub(super) fn check(
     setting: &Setting<'_>,
     motion: &PlannedMotion,
@@ -47,6 +48,7 @@ pub(super) fn check(
     if [&motion.x[0], &motion.x[motion.steps()]] != [&ends[0], &ends[1]] {
         return Err(broken("it does not begin and end at rest".to_owned()));
     }
+    stays_in_travel(setting, motion, transition)?;
     let plant = chain_plant(setting.chain)?;
     let no_torques = vec![0.0; setting.chain.links.len()];
     let mut drift: f64 = 0.0;
@@ -84,4 +86,22 @@ pub(super) fn check(
         rate_rad_per_s: largest(&|x| x.iter().skip(3).step_by(2).fold(0.0, |most: f64, w| most.max(w.abs()))),
         used,
     })
+}
+
+/// Checks that no joint with a potentiometer comes into its dead band.
+fn stays_in_travel(
+    setting: &Setting<'_>,
+    motion: &PlannedMotion,
+    transition: Transition,
+) -> Result<(), SwingUpError> {
+    for sensor in setting.rig.sensors() {
+        let Some(range) = sensor.absolute.filter(AbsoluteRange::has_dead_band) else { continue };
+        let position = |x: &Vec<f64>| (x[sensor.state] / sensor.step::<f64>()).round() as i64;
+        let is_dead = |x: &Vec<f64>| range.is_dead(range.reading(position(x)));
+        let Some(tick) = motion.x.iter().position(is_dead) else { continue };
+        let zeros = range.zeros_that_read(motion.x.iter().map(position));
+        let (link, at_s) = (sensor.state / 2, tick as f64 * motion.tick_s);
+        return Err(SwingUpError::DeadBand { transition, link, at_s, zeros });
+    }
+    Ok(())
 }

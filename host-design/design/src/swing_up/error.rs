@@ -60,6 +60,21 @@ pub enum SwingUpError {
         /// The condition that does not hold.
         what: String,
     },
+    /// A motion comes into the dead band of a potentiometer.
+    #[error(
+        "{transition}: at {at_s:.2} s, link {link} comes into the dead band of its potentiometer; {}",
+        what_zero(zeros)
+    )]
+    DeadBand {
+        /// Which motion.
+        transition: Transition,
+        /// The link, from 1.
+        link: usize,
+        /// When (s).
+        at_s: f64,
+        /// The lowest and the highest `sensor_zero_counts` with which this motion does not; none if there is none.
+        zeros: Option<[u32; 2]>,
+    },
     /// There is no stored motion.
     #[error("{}: no such file; make it with `upright {command}`", file.display())]
     NoFile {
@@ -116,9 +131,24 @@ pub enum SwingUpError {
     Motion(#[from] MotionError),
 }
 
+fn what_zero(zeros: &Option<[u32; 2]>) -> String {
+    match zeros {
+        Some([low, high]) => format!(
+            "it does not, if the potentiometer is turned so that it reads {low} to {high} while the links hang: \
+             sensor_zero_counts"
+        ),
+        None => {
+            "the link turns by more than sensor_travel_rad: use a magnetic sensor or an encoder".to_owned()
+        }
+    }
+}
+
 impl SwingUpError {
     /// Whether file and rig describe a problem, but it has no solution.
     pub fn is_without_solution(&self) -> bool {
-        matches!(self, Self::NoTrajectory { .. } | Self::NotRobust { .. } | Self::Broken { .. })
+        matches!(
+            self,
+            Self::NoTrajectory { .. } | Self::NotRobust { .. } | Self::Broken { .. } | Self::DeadBand { .. }
+        )
     }
 }

@@ -72,11 +72,13 @@ pub(super) fn header(rig: &str, hash: &str) -> String {
 }
 
 /// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included, but not the zeros of
-/// absolute sensors, which no motion depends on.
+/// magnetic sensors and the age of readings, which no motion depends on; that of a potentiometer says where its dead
+/// band is.
 pub(super) fn request_hash(rig: &Rig) -> String {
     let mut rig = rig.clone();
     for link in rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links) {
-        if let Some(LinkEncoder::Absolute { zero_counts, .. }) = &mut link.encoder {
+        link.sensor_delay_s = 0.0;
+        if let Some(LinkEncoder::Absolute { zero_counts, travel_rad: None, .. }) = &mut link.encoder {
             *zero_counts = 0;
         }
     }

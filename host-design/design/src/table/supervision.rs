@@ -81,8 +81,8 @@ fn set_limits_of_chain(
 pub(super) fn absolute_zeros(rig: &Rig, steps: &[f64]) -> AbsoluteZeros<MAX_SENSORS> {
     let mut zeros = AbsoluteZeros::none();
     for (sensor, (description, &step)) in rig.sensors().iter().zip(steps).enumerate() {
-        if let Some([_, zero]) = description.absolute {
-            zeros.zero_counts[sensor] = zero as i32;
+        if let Some(range) = description.absolute {
+            zeros.zero_counts[sensor] = range.zero as i32;
             zeros.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
         }
     }

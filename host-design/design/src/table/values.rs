@@ -275,14 +275,16 @@ fn laws(
 
 fn observer(rig: &Rig, design: &Design<f32>, kalman: &Kalman<f32>) -> ObserverGains<MAX_STATES, MAX_SENSORS> {
     let mut measured = [MAX_STATES as u32; MAX_SENSORS];
-    for (state, sensor) in measured.iter_mut().zip(rig.sensors()) {
-        *state = sensor.state as u32;
+    let mut delay_s = SVector::zeros();
+    for (index, sensor) in rig.sensors().into_iter().enumerate() {
+        (measured[index], delay_s[index]) = (sensor.state as u32, sensor.delay_s as f32);
     }
     ObserverGains {
         ad: widest(&design.ad),
         bd: widest(&design.bd),
         l: widest(&kalman.l_filter),
         measured,
+        delay_s,
         step: widest(&kalman.steps),
     }
 }

@@ -71,9 +71,9 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
                     LinkEncoder::CountsPerRev(counts) => {
                         LinkEncoder::CountsPerRev((counts / factor).round().max(2.0))
                     }
-                    LinkEncoder::Absolute { bits, zero_counts, noise_rad } => {
-                        let noise_rad = more_noise(bits, noise_rad, factor);
-                        LinkEncoder::Absolute { bits, zero_counts, noise_rad }
+                    LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad } => {
+                        let noise_rad = more_noise(bits, travel_rad, noise_rad, factor);
+                        LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad }
                     }
                 });
             }
@@ -86,8 +86,9 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
 }
 
 /// Noise (rad) with which the whole error of an absolute sensor, with its rounding, is `factor` times as large.
-fn more_noise(bits: u8, noise_rad: f64, factor: f64) -> f64 {
-    let rounding = (TAU / f64::from(bits.min(AbsoluteSensor::BITS as u8)).exp2()).powi(2) / 12.0;
+fn more_noise(bits: u8, travel_rad: Option<f64>, noise_rad: f64, factor: f64) -> f64 {
+    let rounding =
+        (travel_rad.unwrap_or(TAU) / f64::from(bits.min(AbsoluteSensor::BITS as u8)).exp2()).powi(2) / 12.0;
     (factor * factor * (noise_rad * noise_rad + rounding) - rounding).max(0.0).sqrt()
 }
 
@@ -145,7 +146,9 @@ pub fn coarsest_encoder(
             .filter_map(|link| match link.encoder? {
                 LinkEncoder::CountsPerRev(counts) => Some(counts),
                 LinkEncoder::StepRad(step) => Some(TAU / step),
-                LinkEncoder::Absolute { bits, .. } => Some(f64::from(bits).exp2()),
+                LinkEncoder::Absolute { bits, travel_rad, .. } => {
+                    Some(f64::from(bits).exp2() * TAU / travel_rad.unwrap_or(TAU))
+                }
             })
             .collect(),
     })

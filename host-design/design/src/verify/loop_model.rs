@@ -57,7 +57,8 @@ pub(crate) struct Numbers<R> {
     pub(super) k_integral: R,
     pub(super) n: R,
     pub(super) observer: Option<ObserverNumbers<R>>,
-    pub(crate) measured: Vec<usize>,
+    /// C of `y = C x`.
+    pub(crate) c: Matrix<R>,
     pub(super) output: usize,
     pub(super) tick_s: R,
     /// Shares of the pending force: in the mean force of a tick, and left for the next one.
@@ -92,7 +93,7 @@ impl<R: Real> Numbers<R> {
                 l: Matrix::from_fn(states, sensors, |i, j| exact(observer.l[(i, j)])),
                 step: observer.step.iter().take(sensors).map(|&step| exact(step)).collect(),
             }),
-            measured: measured(table),
+            c: measurement(table),
             output: table.output as usize,
             tick_s: exact(table.tick_s),
             pending: [exact(table.pending_acts), exact(table.pending_stays)],
@@ -124,10 +125,7 @@ impl<R: Real> Numbers<R> {
         };
         let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
         let sensors = rig.sensors();
-        let measured = match kalman {
-            Some(_) => sensors.iter().map(|sensor| sensor.state).collect(),
-            None => (0..states).collect(),
-        };
+        let c = if kalman.is_some() { rig.measurement() } else { Matrix::identity(states) };
         Some(Self {
             k: Matrix::column(k).transpose(),
             k_pending,
@@ -139,7 +137,7 @@ impl<R: Real> Numbers<R> {
                 l: exact(&kalman.l_filter),
                 step: sensors.iter().map(crate::rig::Sensor::step).collect(),
             }),
-            measured,
+            c,
             output: rig.output(),
             tick_s: R::from_f64(rig.tick.period_s),
             pending: shares(rig, rig.tick.period_s).map(R::from_f64),
@@ -152,9 +150,15 @@ impl<R: Real> Numbers<R> {
     }
 }
 
-/// Indices of the states that the controller measures: those with encoders, or all.
-fn measured(table: &TableValues) -> Vec<usize> {
-    if table.observer.is_some() { table.measured() } else { (0..table.states()).collect() }
+/// C of `y = C x` for what the controller measures: the states with encoders, or all.
+fn measurement<R: Real>(table: &TableValues) -> Matrix<R> {
+    let Some(observer) = &table.observer else { return Matrix::identity(table.states()) };
+    let measured = table.measured();
+    Matrix::from_fn(measured.len(), table.states(), |i, j| match measured[i] {
+        state if state == j => R::one(),
+        state if state + 1 == j => R::from_f64(-f64::from(observer.delay_s[i])),
+        _ => R::zero(),
+    })
 }
 
 /// The certified feedback that rounds to the table's K: that for the tick or that for continuous time.
@@ -175,10 +179,10 @@ pub(super) fn exact_law<'c>(
 
 impl<R: Real> PlantModel<R> {
     /// The plant sampled at its tick, with a delay of whole ticks.
-    pub(crate) fn held(ad: &Matrix<R>, bd: &Matrix<R>, delay_ticks: usize, measured: &[usize]) -> Self {
+    pub(crate) fn held(ad: &Matrix<R>, bd: &Matrix<R>, delay_ticks: usize, c: &Matrix<R>) -> Self {
         let mut taps = vec![Matrix::zeros(ad.rows(), 1); delay_ticks];
         taps.push(bd.clone());
-        Self::with_taps(ad, &taps, measured)
+        Self::with_taps(ad, &taps, c)
     }
 
     /// `ẋ = a x + b u` sampled every `period` seconds, with a force that arrives `delay_ticks` (any real number)
@@ -189,22 +193,22 @@ impl<R: Real> PlantModel<R> {
         b: &Matrix<R>,
         period: f64,
         delay_ticks: f64,
-        measured: &[usize],
+        c: &Matrix<R>,
     ) -> Self {
         let (ad, bd) = zero_order_hold(a, b, &R::from_f64(period));
         let (whole, fraction) = (delay_ticks.floor(), delay_ticks - delay_ticks.floor());
         if fraction == 0.0 {
-            return Self::held(&ad, &bd, whole as usize, measured);
+            return Self::held(&ad, &bd, whole as usize, c);
         }
         let (transition, new) = zero_order_hold(a, b, &R::from_f64(period * (1.0 - fraction)));
         let (_, old) = zero_order_hold(a, b, &R::from_f64(period * fraction));
         let mut taps = vec![Matrix::zeros(a.rows(), 1); whole as usize];
         taps.extend([new, &transition * &old]);
-        Self::with_taps(&ad, &taps, measured)
+        Self::with_taps(&ad, &taps, c)
     }
 
     /// `x⁺ = Ad x + Σ taps[i] u(k - i)`.
-    fn with_taps(ad: &Matrix<R>, taps: &[Matrix<R>], measured: &[usize]) -> Self {
+    fn with_taps(ad: &Matrix<R>, taps: &[Matrix<R>], c: &Matrix<R>) -> Self {
         let (s, past) = (ad.rows(), taps.len() - 1);
         let mut a = Matrix::zeros(s + past, s + past).with_block(0, 0, ad);
         let mut b = Matrix::zeros(s + past, 1).with_block(0, 0, &taps[0]);
@@ -213,8 +217,7 @@ impl<R: Real> PlantModel<R> {
             let (row, one) = (s + i - 1, R::one());
             if i == 1 { b[(row, 0)] = one } else { a[(row, row - 1)] = one }
         }
-        let picks = |i: usize, j: usize| if measured[i] == j { R::one() } else { R::zero() };
-        Self { a, b, c: Matrix::from_fn(measured.len(), s + past, picks), states: s }
+        Self { a, b, c: c.beside(&Matrix::zeros(c.rows(), s + past - c.cols())), states: s }
     }
 }
 
@@ -228,7 +231,7 @@ impl<R: Real> ControllerModel<R> {
     ///
     /// α and β are `pending_acts` and `pending_stays` of the table.
     pub(crate) fn of(numbers: &Numbers<R>) -> Self {
-        let (s, p) = (numbers.k.cols(), numbers.measured.len());
+        let (s, p) = (numbers.k.cols(), numbers.c.rows());
         let [acts, stays] = &numbers.pending;
         let observed = if numbers.observer.is_some() { s } else { 0 };
         let z = (!numbers.k_integral.is_zero()).then_some(observed);
@@ -240,8 +243,7 @@ impl<R: Real> ControllerModel<R> {
         let mut from_memory = Matrix::zeros(s, size);
         let mut from_sensors = Matrix::identity(s);
         if let Some(observer) = &numbers.observer {
-            let picks = |i: usize, j: usize| if numbers.measured[i] == j { R::one() } else { R::zero() };
-            let l_c = &observer.l * &Matrix::from_fn(p, s, picks);
+            let l_c = &observer.l * &numbers.c;
             from_memory = from_memory.with_block(0, 0, &(&Matrix::identity(s) - &l_c));
             from_sensors = observer.l.clone();
         }
@@ -305,7 +307,7 @@ impl<R: Real> LoopModel<R> {
     pub(super) fn with_numbers(certified: &Certified, numbers: &Numbers<R>) -> Self {
         let exact = |m: &Matrix<f64>| m.map(|&entry| R::from_f64(entry));
         let (ad, bd) = certified.double.driven_sampled(&numbers.tick_s.to_f64());
-        let plant = PlantModel::held(&exact(&ad), &exact(&bd), numbers.delay_ticks(), &numbers.measured);
+        let plant = PlantModel::held(&exact(&ad), &exact(&bd), numbers.delay_ticks(), &numbers.c);
         Self::of(&plant, &ControllerModel::of(numbers))
     }
 }

@@ -250,7 +250,7 @@ pub(super) fn delayed_loop(
 ) -> LoopModel<f64> {
     let delay = numbers.delay_ticks() as f64 + further;
     let (a, b) = certified.double.driven();
-    let plant = PlantModel::delayed(&a, &b, tick_s, delay, &numbers.measured);
+    let plant = PlantModel::delayed(&a, &b, tick_s, delay, &numbers.c);
     LoopModel::of(&plant, &ControllerModel::of(numbers))
 }
 

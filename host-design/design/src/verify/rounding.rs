@@ -160,6 +160,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
             bd: widest(&exact.bd),
             l: widest(&exact.l),
             measured: single.measured,
+            delay_s: single.delay_s.map(f64::from),
             step: widest(&Matrix::column(&exact.step)),
         }),
         friction: table.friction.as_ref().map(|single| FrictionMap {

@@ -31,7 +31,7 @@ pub struct TickLimits {
 /// The loop with the same table run every `period` seconds.
 pub(super) fn loop_at(certified: &Certified, numbers: &Numbers<f64>, period: f64) -> LoopModel<f64> {
     let (a, b) = certified.double.driven();
-    let plant = PlantModel::delayed(&a, &b, period, numbers.delay_ticks() as f64, &numbers.measured);
+    let plant = PlantModel::delayed(&a, &b, period, numbers.delay_ticks() as f64, &numbers.c);
     LoopModel::of(&plant, &ControllerModel::of(numbers))
 }
 

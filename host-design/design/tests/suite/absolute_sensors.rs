@@ -10,11 +10,12 @@ use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::design::detection_thresholds;
 use upright_design::harness::{Harness, record, with_firmware};
+use upright_design::numerics::spectral_radius;
 use upright_design::reality::RealEncoders;
 use upright_design::rig::{LinkEncoder, PerJoint, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::Stored;
-use upright_design::verify::linear;
+use upright_design::verify::{LoopModel, linear};
 
 use crate::published::{certified, rig, table};
 use crate::supervised::{ALL_RIGS, ask, balancing, cause, rejected, tick};
@@ -26,7 +27,7 @@ const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
 fn absolute(name: &str, noise_rad: f64) -> Rig {
     let mut rig = rig(name);
     for (link, zero_counts) in rig.chain_mut().unwrap().links.iter_mut().zip(ZEROS) {
-        link.encoder = Some(LinkEncoder::Absolute { bits: 14, zero_counts, noise_rad });
+        link.encoder = Some(LinkEncoder::Absolute { bits: 14, travel_rad: None, zero_counts, noise_rad });
     }
     rig
 }
@@ -216,10 +217,70 @@ fn another_zero_leaves_the_stored_motions_as_they_are() {
     assert!(stored.is_of(&rig));
     let changed = |rig: &mut Rig, bits, zero_counts| {
         rig.chain_mut().unwrap().links[0].encoder =
-            Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad: 1.05e-3 });
+            Some(LinkEncoder::Absolute { bits, travel_rad: None, zero_counts, noise_rad: 1.05e-3 });
     };
     changed(&mut rig, 14, 77);
     assert!(stored.is_of(&rig));
     changed(&mut rig, 13, 77);
     assert!(!stored.is_of(&rig), "negative control");
+}
+
+/// The double with absolute sensors whose readings are `real_s` old, of which the rig file states `stated_s`.
+fn late(stated_s: f64, real_s: f64) -> Rig {
+    let mut rig = rig("double-absolute");
+    rig.chain_mut().unwrap().links.iter_mut().for_each(|link| link.sensor_delay_s = stated_s);
+    rig.reality.sensors.sensor_delay_s = PerJoint::all(real_s - stated_s);
+    rig
+}
+
+/// How far the first link of the balanced double leans in 10 s (rad); none if the motor goes off.
+fn lean_rad(rig: &Rig) -> Option<f64> {
+    let values = table(rig);
+    let scenario = Scenario { duration_s: 10.0, ..Scenario::at_rest(rig, Law::Lqr) };
+    let run = with_firmware(&values, |firmware| record(rig, &values, &scenario, firmware)).unwrap().unwrap();
+    run.fault.is_none().then_some(run.summary.peak_angles_rad[0])
+}
+
+#[test]
+fn the_stated_age_of_readings_is_made_up_for() {
+    let fresh_rad = lean_rad(&late(0.0, 0.0)).unwrap();
+    for age_s in [1e-3, 8e-3, 12e-3] {
+        let stated_rad = lean_rad(&late(age_s, age_s)).unwrap();
+        assert!(stated_rad < 1.5 * fresh_rad, "{age_s}: {stated_rad} {fresh_rad}");
+        let ignored_rad = lean_rad(&late(0.0, age_s));
+        eprintln!("{age_s} {fresh_rad} {stated_rad} {ignored_rad:?}");
+        match ignored_rad {
+            // Negative controls: so old that the loop nearly falls, and falls, if nobody knows.
+            Some(lean_rad) if age_s > 5e-3 => assert!(age_s < 10e-3 && lean_rad > 5.0 * stated_rad),
+            lean_rad => assert_eq!(lean_rad.is_none(), age_s > 10e-3),
+        }
+    }
+}
+
+#[test]
+fn the_linear_loop_has_the_age_of_the_readings_too() {
+    let largest = |rig: &Rig| {
+        let model = LoopModel::<f64>::as_it_runs(certified(rig), &table(rig), Law::Lqr).unwrap();
+        spectral_radius(&model.matrix).unwrap()
+    };
+    let (stated, fresh) = (largest(&late(8e-3, 8e-3)), largest(&late(0.0, 0.0)));
+    assert!((stated - fresh).abs() < 1e-3 && stated < 1.0, "{stated} {fresh}");
+    // The cart's sensor is not late.
+    let (c, fresh) = (late(8e-3, 8e-3).measurement::<f64>(), late(0.0, 0.0).measurement::<f64>());
+    assert_eq!((c[(0, 0)], c[(0, 1)], c[(1, 2)], c[(1, 3)]), (1.0, 0.0, 1.0, -8e-3));
+    assert_eq!((fresh[(1, 2)], fresh[(1, 3)]), (1.0, 0.0));
+}
+
+#[test]
+fn an_age_needs_a_sensor_and_leaves_stored_motions_as_they_are() {
+    let path = crate::published::rig_path("double-absolute");
+    assert!(Stored::beside(&path).unwrap().is_of(&late(1e-3, 1e-3)));
+    let text = std::fs::read_to_string(&path).unwrap();
+    let stating = |text: String| Rig::from_toml(&text, &path);
+    let with_age = text.replacen("sensor_bits = 14", "sensor_delay_s = 0.001\nsensor_bits = 14", 1);
+    assert_eq!(stating(with_age).unwrap().sensors()[1].delay_s, 1e-3);
+    let bare = ["sensor_zero_counts = 9021\n", "sensor_zero_counts = 12\n", "sensor_noise_rad = 1.05e-3\n"];
+    let bare = bare.iter().fold(text, |text, line| text.replace(line, ""));
+    let error = stating(bare.replace("sensor_bits = 14", "sensor_delay_s = 0.001")).unwrap_err().to_string();
+    assert!(error.contains("link[1].sensor_delay_s") && error.contains("only with an encoder"), "{error}");
 }

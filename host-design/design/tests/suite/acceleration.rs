@@ -13,7 +13,7 @@ use upright_design::table::TableValues;
 use crate::published::{certified, rig, table};
 
 /// The rig in this file on a stepper, with this weight of its acceleration.
-fn stepper(name: &str, weight: f64, period_s: f64) -> Rig {
+pub(crate) fn stepper(name: &str, weight: f64, period_s: f64) -> Rig {
     let mut rig = rig(name);
     let drive = AccelerationDrive {
         acceleration_limit_m_per_s2: 15.0,

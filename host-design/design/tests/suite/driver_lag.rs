@@ -142,6 +142,16 @@ fn the_lags_that_are_stated_as_limits_are_those_at_which_the_machine_falls() {
 }
 
 #[test]
+fn a_tick_of_delay_is_made_up_for_as_so_much_more_lag() {
+    let mut real = really(&crate::published::rig("quadruple-paper"), 0.002);
+    real.tick.delay_ticks = 1;
+    let of = |designed: &Rig| run(&real, &table(designed), &balancing(&real)).0.survives();
+    assert!(of(&lagging("quadruple-paper", 0.003)));
+    // Negative control.
+    assert!(!of(&crate::published::rig("quadruple-paper")));
+}
+
+#[test]
 fn rigs_are_raised_and_lowered_as_often_with_a_late_force() {
     let condition = Condition::all()[2];
     const RUNS: u64 = 20;
@@ -176,7 +186,12 @@ fn a_lag_belongs_to_a_force_without_a_tick_of_delay() {
     let good = text("single-quanser-ip02", "driver_lag_s = 0.002");
     assert_eq!(crate::published::rig_of(&good).actuator.driver_lag_s, Some(0.002));
     let late = error(&good.replace("delay_ticks = 0", "delay_ticks = 1"));
-    assert!(late.contains("actuator.driver_lag_s") && late.contains("only with delay_ticks = 0"), "{late}");
+    assert!(
+        late.contains("actuator.driver_lag_s")
+            && late.contains("only with delay_ticks = 0")
+            && late.contains("add a tick to driver_lag_s"),
+        "{late}"
+    );
     assert!(
         error(&good.replace("driver_lag_s = 0.002", "driver_lag_s = 0"))
             .contains("actuator.driver_lag_s: found 0")

@@ -20,6 +20,7 @@ mod plant_linearisation;
 mod plant_motion;
 mod plant_rigs;
 mod plant_sines;
+mod potentiometer;
 mod public_machines;
 mod pushes;
 mod reality_friction;

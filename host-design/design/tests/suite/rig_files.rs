@@ -67,6 +67,7 @@ fn the_paper_rig_has_the_papers_values() {
 #[test]
 fn what_is_left_out_gets_its_documented_default() {
     let link = Link {
+        sensor_delay_s: 0.0,
         mass_kg: 0.5,
         length_m: 0.4,
         centre_of_mass_m: None,

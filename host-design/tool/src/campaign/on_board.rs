@@ -2,8 +2,10 @@
 //! onset.
 
 use rand::RngExt;
+use rand_pcg::Pcg64;
 use upright_board::{
-    Chip, Conditions, ExternalLevel, Image, Input, Pin, Time, UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND,
+    Chip, Conditions, ExternalLevel, Image, Input, Pin, SensorDefect, Time, UNITS_PER_MICROSECOND as US,
+    UNITS_PER_SECOND,
 };
 
 use upright_design::defects::{Defect, Trial};
@@ -97,6 +99,9 @@ impl OnChip for Defect {
                 let volts = 2.0 + 0.6 * trial.size as f32;
                 vec![at(anywhere, Input::ChipSupply(volts)), at(anywhere + DIP, Input::ChipSupply(3.3))]
             }
+            Defect::SensorWire | Defect::MagnetMissing | Defect::FrameBit => {
+                of_absolute_sensor(trial, table, tick, &mut random)
+            }
             Defect::HostWireOpen => vec![at(0, Input::Level(receive, ExternalLevel::Open)), Event::CutLine],
             Defect::LineNoise => {
                 let bauds = [9_600, 57_600, 115_200, 460_800, 500_000, 1_000_000];
@@ -124,6 +129,38 @@ impl OnChip for Defect {
             }
             _ => Vec::new(),
         }
+    }
+}
+
+/// Events of a defect of an absolute sensor.
+fn of_absolute_sensor(trial: &Trial, table: &TableValues, tick: Time, random: &mut Pcg64) -> Vec<Event> {
+    let at = |after: Time, input: Input| Event::Input { after, input };
+    match trial.kind {
+        Defect::SensorWire if table.absolute.is_potentiometer(&table.limits, trial.sensor) => {
+            // It turns on all the time.
+            let share = if trial.sign > 0.0 { 0.0 } else { 1.0 };
+            let ticks = 0..trial.watched as Time;
+            ticks.map(|since| at(since * tick, Input::Wiper(share))).collect()
+        }
+        Defect::SensorWire | Defect::MagnetMissing => {
+            let defect = match trial.kind {
+                Defect::MagnetMissing => SensorDefect::NoMagnet,
+                _ if trial.sign > 0.0 => SensorDefect::WireOpen,
+                _ => SensorDefect::WireGrounded,
+            };
+            vec![at(0, Input::AngleDefect { encoder: trial.sensor, defect })]
+        }
+        Defect::FrameBit => {
+            let every = tick * (5 + (45.0 * trial.size) as Time);
+            let show = |after, defect| at(after, Input::AngleDefect { encoder: trial.sensor, defect });
+            let one = |number: Time| {
+                let bits = SensorDefect::FlippedBits(1 << random.random_range(0..16));
+                let begin = number * every;
+                [show(begin, bits), show(begin + tick / 2, SensorDefect::None)]
+            };
+            (0..trial.watched as Time * tick / every).flat_map(one).collect()
+        }
+        _ => Vec::new(),
     }
 }
 

@@ -96,7 +96,11 @@ fn sensors(plan: CommissionPlan<'_>) -> Vec<AbsoluteLink> {
     let absolute = links.iter().enumerate().filter_map(|(index, link)| match link.encoder {
         Some(LinkEncoder::Absolute { bits, .. }) => {
             let turn = (TAU / step(plan, index + 1)).round();
-            Some(AbsoluteLink { link: index + 1, turn, finer: (f64::from(bits).exp2() / turn) as u32 })
+            Some(AbsoluteLink {
+                link: index + 1,
+                turn,
+                finer: (f64::from(bits).exp2() / turn).max(1.0) as u32,
+            })
         }
         _ => None,
     });

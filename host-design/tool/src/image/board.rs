@@ -66,6 +66,9 @@ impl BoardName {
     /// Bits of the absolute sensors that a board reads, AS5047D or AS5047P.
     pub const ANGLE_BITS: u32 = 14;
 
+    /// Bits of the converter that reads a potentiometer.
+    pub const WIPER_BITS: u32 = 12;
+
     /// Most step pulses in a tick: its timer counts them with 8 bits.
     pub const PULSES: u32 = 256;
 

@@ -104,19 +104,25 @@ fn check_board(
 
 /// Checks that the board reads the absolute sensors of the table's rig, if it has any.
 fn reads_all(board: BoardName, table: &TableValues) -> Result<(), BuildError> {
-    let turns = table.limits.turn_counts.iter().zip(&table.absolute.zero_counts).zip(0..);
-    let wrong = turns.filter(|((turn, zero), _)| **zero >= 0 && **turn != 1 << BoardName::ANGLE_BITS);
-    match counts_all(table) {
-        Err(_) if board.reads_angles() => {
-            wrong.map(|(_, link)| Err(BuildError::AngleBits { board, link })).next().unwrap_or(Ok(()))
-        }
-        result => result,
+    if !board.reads_angles() {
+        return counts_all(table);
     }
+    for link in (1..table.sensors()).filter(|&link| table.absolute.is_absolute(link)) {
+        let turn = table.limits.turn_counts[link];
+        match table.absolute.is_potentiometer(&table.limits, link) {
+            true if link != 1 || turn.ilog2() != BoardName::WIPER_BITS => {
+                return Err(BuildError::Potentiometer { board, link });
+            }
+            false if turn != 1 << BoardName::ANGLE_BITS => return Err(BuildError::AngleBits { board, link }),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Checks that the table's rig has encoders alone.
 pub(super) fn counts_all(table: &TableValues) -> Result<(), BuildError> {
-    let link = table.absolute.zero_counts.iter().take(table.sensors()).position(|&zero| zero >= 0);
+    let link = (0..table.sensors()).find(|&sensor| table.absolute.is_absolute(sensor));
     link.map_or(Ok(()), |link| Err(BuildError::AbsoluteSensor { link }))
 }
 

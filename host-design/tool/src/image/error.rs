@@ -45,6 +45,18 @@ pub enum BuildError {
         /// The first such link, from 1.
         link: usize,
     },
+    /// A link has a potentiometer that the board does not read.
+    #[error(
+        "{board} reads one potentiometer, with {} bits, at link 1, and link {link} has another: use a sensor of another \
+         kind there, set its sensor_bits, or write a board that reads it (docs/own-board.md)",
+        BoardName::WIPER_BITS
+    )]
+    Potentiometer {
+        /// Which board.
+        board: BoardName,
+        /// The first such link, from 1.
+        link: usize,
+    },
     /// A link has an absolute sensor, and the board reads encoders alone.
     #[error(
         "this board reads encoders alone, and link {link} has an absolute sensor (sensor_bits): use another board \

@@ -8,14 +8,14 @@ use upright_design::design::design;
 use upright_design::harness::{Harness, Recording, record};
 use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::{hangs, up_and_down};
+use upright_design::swing_up::{Stored, hangs, refined, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
 use upright_design::verify::at_rest_disturbed;
 use upright_tool::image::{BoardName, ImageKind, build_for};
 use upright_tool::in_the_loop::{Event, VirtualBoard, measure, run_compared};
 
 use crate::equipment::built_for;
-use crate::published::{rig_and_table, rig_and_table_with_motions};
+use crate::published::{rig_and_table, rig_and_table_with_motions, rig_path};
 
 /// Readings while the links hang: the first link wraps on its way up, and all of them near upright or hanging.
 const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
@@ -24,8 +24,17 @@ const ZEROS: [u32; 4] = [3, 16_000, 1, 16_382];
 fn absolute(name: &'static str, bits: u8, noise_rad: f64) -> (Rig, TableValues) {
     let mut rig = rig_and_table(name).0.clone();
     for (link, zero_counts) in rig.chain_mut().unwrap().links.iter_mut().zip(ZEROS) {
-        link.encoder = Some(LinkEncoder::Absolute { bits, zero_counts, noise_rad });
+        link.encoder = Some(LinkEncoder::Absolute { bits, travel_rad: None, zero_counts, noise_rad });
     }
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    (rig, table)
+}
+
+/// The single pendulum with a potentiometer of 340° whose dead band neither balancing nor its motions reach.
+fn potentiometer(noise_rad: f64) -> (Rig, TableValues) {
+    let mut rig = rig_and_table("single-absolute").0.clone();
+    rig.chain_mut().unwrap().links[0].encoder =
+        Some(LinkEncoder::Absolute { bits: 12, travel_rad: Some(5.934), zero_counts: 2600, noise_rad });
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     (rig, table)
 }
@@ -67,8 +76,12 @@ fn the_image_balances_with_absolute_sensors_with_the_bits_of_the_host() {
 
 #[test]
 fn the_image_raises_and_lowers_links_with_absolute_sensors() {
-    for name in ["single-absolute", "double-absolute"] {
-        let (rig, table) = rig_and_table_with_motions(name);
+    let (rig, table) = potentiometer(1e-3);
+    let stored = Stored::beside(&rig_path("single-absolute")).unwrap();
+    let table = with_motions(&rig, table, &refined(&rig, &stored).unwrap(), &[]).unwrap();
+    let magnets = ["single-absolute", "double-absolute"].map(rig_and_table_with_motions);
+    for (rig, table) in magnets.into_iter().chain([&(rig, table)]) {
+        let name = &rig.name;
         let Some(image) = image(rig, table) else { return };
         let mut board = VirtualBoard::start(&image, &Conditions::f405(1), table).unwrap();
         let recording = record(rig, table, &up_and_down(rig, table, 0.5).unwrap(), &mut board).unwrap();
@@ -81,7 +94,7 @@ fn the_image_raises_and_lowers_links_with_absolute_sensors() {
 fn with_defect(
     (rig, table): &(Rig, TableValues),
     image: &Image,
-    defect: impl Fn(usize) -> SensorDefect,
+    input: impl Fn(usize) -> Option<Input>,
 ) -> (Option<(Fault, Option<u8>)>, usize, u32) {
     let mut board = VirtualBoard::start(image, &Conditions::f405(1), table).unwrap();
     let events = board.events();
@@ -89,9 +102,8 @@ fn with_defect(
     let output = harness.raise(None).unwrap();
     harness.bench.tick(output.drive);
     let mut off = None;
-    for tick in 0..1000 {
-        if tick >= 100 {
-            let input = Input::AngleDefect { encoder: 1, defect: defect(tick - 100) };
+    for tick in 0..1000_usize {
+        if let Some(input) = tick.checked_sub(100).and_then(&input) {
             events.borrow_mut().push(Event::Input { after: 0, input });
         }
         let inputs = harness.inputs();
@@ -112,6 +124,50 @@ fn with_defect(
     (cause.map(|cause| (cause.fault, cause.sensor)), off.unwrap_or(0), statistics.rejected_samples)
 }
 
+/// This defect of the first sensor.
+fn of_sensor(defect: SensorDefect) -> Option<Input> {
+    Some(Input::AngleDefect { encoder: 1, defect })
+}
+
+#[test]
+fn the_image_balances_with_a_potentiometer_with_the_bits_of_the_host() {
+    // Without noise: a command that the board executes a tick before the host begins the sign check at another count.
+    let (rig, table) = potentiometer(0.0);
+    let Some(image) = image(&rig, &table) else { return };
+    let start = || VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
+    let scenario = Scenario { duration_s: 4.0, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let (recording, _): (Recording, _) = run_compared(&rig, &table, &scenario, &mut start()).unwrap();
+    assert!(recording.fault.is_none() && recording.summary.survives(), "{:?}", recording.fault);
+
+    // Negative control: a sensor that is off by one reading on the board.
+    let mut other = table.clone();
+    other.absolute.zero_counts[1] += 1;
+    let error = run_compared(&rig, &other, &scenario, &mut start()).unwrap_err().to_string();
+    assert!(error.contains("differ"), "{error}");
+
+    let cycles = measure(&rig, &table, &scenario, &image, &Conditions::f405(1)).unwrap();
+    println!("inputs {:?}, whole {:?}", cycles.all.inputs, cycles.all.whole);
+    assert!(cycles.all.inputs.us < 8.0 && cycles.check().is_ok(), "{:?}", cycles.all.inputs);
+}
+
+#[test]
+fn a_wiper_with_an_open_wire_or_a_short_circuit_is_a_fault_in_the_third_tick() {
+    let rig = potentiometer(1e-3);
+    let Some(image) = image(&rig.0, &rig.1) else { return };
+    for share in [0.0, 0.01, 0.99, 1.0] {
+        let found = with_defect(&rig, &image, |_| Some(Input::Wiper(share)));
+        assert_eq!((found.0, found.1), (Some((Fault::Encoder, Some(1))), 3), "{share}");
+    }
+    // Two of four, and in the middle of the range, where the observer alone finds it.
+    let often = with_defect(&rig, &image, |tick| match tick % 4 {
+        0 | 1 => Some(Input::Wiper(0.0)),
+        _ => None,
+    });
+    assert_eq!(often.0, None);
+    let found = with_defect(&rig, &image, |_| Some(Input::Wiper(0.5)));
+    assert!(found.0.is_some() && found.1 > 1, "{found:?}");
+}
+
 #[test]
 fn defects_of_an_absolute_sensor_are_found_or_survived() {
     for (name, noise_rad) in [("single-quanser-ip02", 4e-4), ("quadruple-paper", 2e-5)] {
@@ -124,13 +180,13 @@ fn defects_of_an_absolute_sensor_are_found_or_survived() {
             ("one wrong bit", SensorDefect::FlippedBits(1 << 9)),
             ("three wrong bits", SensorDefect::FlippedBits(7 << 5)),
         ] {
-            let found = with_defect(&rig, &image, |_| defect);
+            let found = with_defect(&rig, &image, |_| of_sensor(defect));
             println!("{name}, {what}: {found:?}");
             assert_eq!((found.0, found.1), (Some((Fault::Encoder, Some(1))), 3), "{name} {what}");
         }
         let odd = |tick: usize| match tick % 4 {
-            0 | 1 => SensorDefect::FlippedBits(1 << 9),
-            _ => SensorDefect::None,
+            0 | 1 => of_sensor(SensorDefect::FlippedBits(1 << 9)),
+            _ => of_sensor(SensorDefect::None),
         };
         let survived = with_defect(&rig, &image, odd);
         println!("{name}, two of four with a wrong bit: {survived:?}");
@@ -139,7 +195,7 @@ fn defects_of_an_absolute_sensor_are_found_or_survived() {
         for (what, defect) in
             [("two wrong bits", SensorDefect::FlippedBits(3 << 9)), ("stuck", SensorDefect::Stuck)]
         {
-            let found = with_defect(&rig, &image, |_| defect);
+            let found = with_defect(&rig, &image, |_| of_sensor(defect));
             println!("{name}, {what}: {found:?}");
             assert!(found.0.is_some(), "{name} {what}");
         }
@@ -154,6 +210,13 @@ fn an_image_is_refused_for_a_board_or_a_sensor_that_do_not_fit() {
     };
     let bits = refused(BoardName::WeactF405, 12);
     assert!(bits.contains("link 1") && bits.contains("14 bits") && bits.contains("own-board.md"), "{bits}");
+    let (mut rig, _) = potentiometer(1e-3);
+    let encoder =
+        LinkEncoder::Absolute { bits: 14, travel_rad: Some(5.934), zero_counts: 10_400, noise_rad: 1e-3 };
+    rig.chain_mut().unwrap().links[0].encoder = Some(encoder);
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let of_14 = build_for(ImageKind::Board(BoardName::WeactF405), &rig, &table).unwrap_err().to_string();
+    assert!(of_14.contains("one potentiometer, with 12 bits, at link 1"), "{of_14}");
     let feather = refused(BoardName::FeatherF405, 14);
     assert!(feather.contains("link 1") && feather.contains("another board"), "{feather}");
 }

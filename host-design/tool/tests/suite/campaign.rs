@@ -2,9 +2,10 @@
 //! missed.
 
 use upright_board::{Conditions, Image};
+use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
-use upright_design::table::TableValues;
+use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Campaign, Defect, During, Setup, Trial, campaign, feed, kinds, one};
 use upright_tool::image::{self, BoardName};
 use upright_tool::in_the_loop::RunPlace;
@@ -30,6 +31,20 @@ fn every_defect_is_found_and_nothing_else() {
             assert!(row.wrong.is_empty() && row.runs == 5, "{name}: {row:?}");
         }
     }
+}
+
+#[test]
+fn a_late_force_that_the_rig_file_states_hides_no_defect() {
+    let mut rig = rig_and_table("quadruple-paper").0.clone();
+    rig.actuator.driver_lag_s = Some(0.002);
+    let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
+    let kinds = kinds(&table, RunPlace::Host);
+    for row in &run(&on_host(&rig, &table), &kinds, 5 * kinds.len() as u64).rows {
+        assert!(row.missed == 0 && row.false_alarms == 0 && row.wrong.is_empty(), "{row:?}");
+    }
+    // Negative control: without detection, a dead motor is missed.
+    let blind = Setup { detection: false, ..on_host(&rig, &table) };
+    assert_eq!(run(&blind, &[Defect::MotorDead], 4).rows[0].missed, 4);
 }
 
 #[test]

@@ -167,7 +167,7 @@ fn no_zero_is_measured_of_a_link_that_moves_or_a_sensor_that_does_not() {
     };
     let mut dead = rig.clone();
     dead.chain_mut().unwrap().links[1].encoder =
-        Some(LinkEncoder::Absolute { bits: 14, zero_counts: 0, noise_rad: 0.0 });
+        Some(LinkEncoder::Absolute { bits: 14, travel_rad: None, zero_counts: 0, noise_rad: 0.0 });
     for (machine, planted, is_restless, words) in [
         (rig, None, true, "rad: let it hang still"),
         (rig, Some("encoder-frozen"), false, "the sensor of link 1 does not count"),

@@ -18,6 +18,7 @@ mod identify_command;
 mod image;
 mod import_command;
 mod jog;
+mod late_on_board;
 mod lossy_line;
 mod memory_check;
 mod monitor;

@@ -1,13 +1,16 @@
 //! A drive that takes pulses, on the virtual board: every pulse of the flashed image is counted, with its time and its
 //! direction, and those of each tick are the host's.
 
+use core::f64::consts::PI;
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
+use upright::supervision::homing::Homing;
 use upright::table::Law;
 use upright_board::{Conditions, Image, Input, Pulse, Time, UNITS_PER_MICROSECOND as US, seconds};
-use upright_design::harness::{Recording, record};
+use upright_design::harness::{Harness, RailEnds, Recording, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
@@ -290,4 +293,37 @@ fn defects_of_a_stepper_are_found_on_the_board_as_on_the_host() {
     let unguarded = Setup { guards: false, ..setup };
     let missed = one(&unguarded, &[Defect::StopBetweenTicks], 1, 0).unwrap();
     assert_eq!(missed.class, Class::Missed, "{missed:?}");
+}
+
+#[test]
+fn a_stepper_finds_both_switches_of_its_rail_on_the_board() {
+    let (rig, table) = rig_and_table("single-stepper");
+    let Some(image) = image(rig, table) else { return };
+    let ends = RailEnds::of(rig);
+    // Negative control: without the high one, homing ends where it should have been.
+    for (has_high, wanted) in [(true, Homing::Homed), (false, Homing::WrongTravel)] {
+        let (mut board, log) = counted(&image, table, |_, _, _| None);
+        let mut harness = Harness::new(rig, table, &Scenario::at_rest(rig, Law::Lqr), &mut board).unwrap();
+        harness.bench.hold(&[0.05, 0.0, PI, 0.0]);
+        harness.session.send(Request::HomeRail);
+        let (mut homing, mut ticks) = (None, 0);
+        let is_homing = |homing| matches!(homing, Some(Homing::Touch { .. } | Homing::HoldStill));
+        while ticks < 100 || ticks < 6000 && is_homing(homing) {
+            let mut inputs = harness.inputs();
+            ends.press(harness.bench.state()[0], &mut inputs.contacts);
+            inputs.contacts.limit_high &= has_high;
+            let output = harness.session.tick(&inputs).unwrap();
+            harness.bench.tick(output.drive);
+            while let Some(telemetry) = harness.session.next_telemetry() {
+                homing = Some(telemetry.homing);
+            }
+            ticks += 1;
+        }
+        let cart_m = harness.bench.state()[0];
+        println!("{homing:?} after {ticks} ticks, at {cart_m} m");
+        assert_eq!(homing, Some(wanted));
+        assert!(!has_high || cart_m.abs() < 2e-3, "{cart_m}");
+        let counted = log.borrow();
+        assert!(counted.pulses > 5_000 && counted.wrong.is_none(), "{} {:?}", counted.pulses, counted.wrong);
+    }
 }

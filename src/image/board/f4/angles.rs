@@ -8,13 +8,12 @@
 //! wire at 3.3 V is an error flag; a wire at 0 V is a sensor that says that it is not ready.
 
 use cortex_m::asm;
-use upright::board::BadSamples;
 use upright::control::encoder::AbsoluteSensor;
 use upright::gains::SENSORS;
 
 use super::boards::BOARD;
 use super::pins;
-use super::sensors::{ANY_IS_ABSOLUTE, BITS, is_absolute};
+use super::sensors::{ANY_IS_ON_BUS, BITS, is_on_bus};
 use super::wiring::{Signal, Wire, wire_of};
 
 /// In every answer: the sensor has found an error in a command. It stays until the errors are read.
@@ -49,7 +48,7 @@ const COMMAND: Wire = bus(Signal::AngleCommand);
 
 /// A wire of the bus; any wire, in an image that has no bus.
 const fn bus(signal: Signal) -> Wire {
-    wire_of(BOARD.wiring, if ANY_IS_ABSOLUTE { signal } else { Signal::Tick })
+    wire_of(BOARD.wiring, if ANY_IS_ON_BUS { signal } else { Signal::Tick })
 }
 
 /// The absolute sensors.
@@ -57,14 +56,13 @@ pub(super) struct Angles {
     sensors: [AbsoluteSensor; SENSORS],
     /// What the next frame answers.
     asked: u16,
-    pub(super) bad: BadSamples,
 }
 
 impl Angles {
     /// The sensors before [`set_up`](Self::set_up).
     pub(super) fn new() -> Self {
         let sensors = [const { AbsoluteSensor::new(BITS) }; SENSORS];
-        Self { sensors, asked: READ_STATE, bad: BadSamples::default() }
+        Self { sensors, asked: READ_STATE }
     }
 
     /// Waits until the sensors are ready, and asks them for their state.
@@ -76,27 +74,28 @@ impl Angles {
         transfer(self.asked);
     }
 
-    /// Reads all sensors into `raw_counts`; the counts of bad samples are not changed.
-    pub(super) fn read(&mut self, raw_counts: &mut [u32; SENSORS]) {
+    /// Reads all sensors into `raw_counts`; the counts of bad samples are not changed. Returns which are bad, by bits.
+    pub(super) fn read(&mut self, raw_counts: &mut [u32; SENSORS]) -> u32 {
+        let mut bad = 0;
         let states = transfer(READ_ANGLE);
         let was_state = self.asked == READ_STATE;
-        let has_error =
-            states.iter().zip(0..).any(|(&state, sensor)| is_absolute(sensor) && !is_sound(state));
+        let has_error = states.iter().zip(0..).any(|(&state, sensor)| is_on_bus(sensor) && !is_sound(state));
         self.asked = if was_state && has_error { READ_ERRORS } else { READ_STATE };
         let answers = transfer(self.asked).into_iter().zip(states);
         for (number, ((count, sensor), (angle, state))) in
             raw_counts.iter_mut().zip(&mut self.sensors).zip(answers).enumerate()
         {
-            if !is_absolute(number) {
+            if !is_on_bus(number) {
                 continue;
             }
             let is_ready = state & (READY | OVERFLOW | MAGNET_LOW) == READY;
             if is_sound(angle) && (!was_state || is_sound(state) && is_ready) {
                 *count = sensor.count((angle & ((1 << BITS) - 1)).into());
             } else {
-                self.bad.now |= 1 << number;
+                bad |= 1 << number;
             }
         }
+        bad
     }
 }
 
@@ -135,5 +134,5 @@ fn transfer(command: u16) -> [u16; SENSORS] {
 
 /// The data line of a sensor, if it is absolute.
 const fn data(sensor: usize) -> Option<Wire> {
-    if is_absolute(sensor) { Some(wire_of(BOARD.wiring, Signal::Encoder(sensor as u8, b'A'))) } else { None }
+    if is_on_bus(sensor) { Some(wire_of(BOARD.wiring, Signal::Encoder(sensor as u8, b'A'))) } else { None }
 }

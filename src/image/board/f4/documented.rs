@@ -46,7 +46,11 @@ fn pin(wire: &Wire) -> String {
 
 fn row(wire: &Wire, has_bus: bool) -> String {
     let pull_up = if wire.pull_up { "pull-up" } else { "" };
-    let data = if has_bus && matches!(wire.signal, Signal::Encoder(1.., b'A')) { "; or MISO" } else { "" };
+    let data = match wire.signal {
+        Signal::Encoder(1.., b'A') if has_bus => "; or MISO",
+        Signal::Encoder(1, b'B') if has_bus => "; or wiper",
+        _ => "",
+    };
     format!("| {} | {} | {}{data} | {pull_up} |", pin(wire), wire.function, connected_to(wire.signal))
 }
 

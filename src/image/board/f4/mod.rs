@@ -21,7 +21,7 @@ use crate::pac::{EXTI, PWR, Peripherals};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
 use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
-use upright::control::encoder::CounterWidth;
+use upright::control::encoder::{CounterWidth, is_at_end};
 use upright::gains::SENSORS;
 use upright::protocol::message::Start;
 
@@ -30,7 +30,7 @@ pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
 pub(crate) use memory::MemoryCheck;
 use motor::{GIVES_PULSES, Motor};
-use sensors::ANY_IS_ABSOLUTE;
+use sensors::{ANY_IS_ABSOLUTE, ANY_IS_ON_BUS, WIPER_BITS, WIPER_WIRE};
 pub(crate) use serial::{DmaBuffer, DmaLine};
 use steps::Steps;
 use supply::Supply;
@@ -42,8 +42,10 @@ pub(crate) struct F4Board {
     motor: Motor,
     /// One, if the drive takes pulses.
     steps: [Steps; GIVES_PULSES as usize],
+    /// One, if the rig has absolute sensors on the bus.
+    angles: [Angles; ANY_IS_ON_BUS as usize],
     /// One, if the rig has absolute sensors.
-    angles: [Angles; ANY_IS_ABSOLUTE as usize],
+    bad: [BadSamples; ANY_IS_ABSOLUTE as usize],
     supply: Supply,
     exti: EXTI,
     power: PWR,
@@ -78,7 +80,7 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
     core.DWT.enable_cycle_counter();
     let wrong_chip = !guard::chip_is_right(&device.DBGMCU);
     pins::set_status_led(clock == Clock::Full && !wrong_chip && !motor.has_failed());
-    let angles: [Angles; ANY_IS_ABSOLUTE as usize] = core::array::from_fn(|_| Angles::new());
+    let angles: [Angles; ANY_IS_ON_BUS as usize] = core::array::from_fn(|_| Angles::new());
     angles.iter().for_each(Angles::set_up);
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
@@ -86,6 +88,7 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
         motor,
         steps: [const { Steps::new() }; GIVES_PULSES as usize],
         angles,
+        bad: core::array::from_fn(|_| BadSamples::default()),
         supply,
         exti: device.EXTI,
         power: device.PWR,
@@ -119,16 +122,15 @@ impl Board<SENSORS> for F4Board {
         if let ([steps], [pulses, ..]) = (self.steps.as_mut_slice(), raw_counts.as_mut_slice()) {
             (*pulses, is_late) = (steps.given(), steps.was_late());
         }
-        if let [angles] = self.angles.as_mut_slice() {
-            angles.read(&mut raw_counts);
-        }
+        let (mut bad, mut wiper) =
+            (self.angles.first_mut().map_or(0, |angles| angles.read(&mut raw_counts)), 0);
         // Clears the flag of the current tick.
         let _ = tick_is_due();
         let [limit_low, limit_high] = pins::limits();
         let [was_low, was_high] = self.limits;
-        Inputs {
+        let mut inputs = Inputs {
             raw_counts,
-            supply_v: self.supply.volts(),
+            supply_v: self.supply.volts(&mut wiper),
             contacts: Contacts {
                 // A contact counts only if it was open at the end of the previous tick, too: a spike that a wire picks
                 // up from the switching bridge must not trip.
@@ -142,11 +144,20 @@ impl Board<SENSORS> for F4Board {
                     | self.motor.has_failed()
                     | guard::supply_was_low(&self.power, &self.exti),
             },
+        };
+        if let (true, [_, count, ..]) = (WIPER_WIRE.is_some(), inputs.raw_counts.as_mut_slice()) {
+            // In its dead band, with an open wire or with a short circuit.
+            bad |= u32::from(is_at_end(wiper, WIPER_BITS)) << 1;
+            *count = wiper;
         }
+        if let [samples] = self.bad.as_mut_slice() {
+            samples.now = bad;
+        }
+        inputs
     }
 
     fn bad_samples(&mut self) -> Option<&mut BadSamples> {
-        self.angles.first_mut().map(|angles| &mut angles.bad)
+        self.bad.first_mut()
     }
 
     fn tick_s(&self) -> f32 {

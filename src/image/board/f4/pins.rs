@@ -46,7 +46,7 @@ const SET_UP: [PortSettings; PORTS] = {
             PinMode::Alternate(_) => 2,
             PinMode::Analog => 3,
         } << at;
-        port.pull |= (wire.pull_up as u32) << at;
+        port.pull |= (wire.pull_up && !matches!(mode, PinMode::Analog)) as u32 * (1 << at);
         if let PinMode::Alternate(number) = mode {
             port.alternate[half] |= (number as u32) << (4 * (wire.pin % 8));
             port.four_bits[half] |= 15 << (4 * (wire.pin % 8));

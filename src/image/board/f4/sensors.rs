@@ -2,16 +2,22 @@
 
 use upright::gains::{SENSORS, TABLE};
 
-use super::wiring::{PinMode, Signal, Wire};
+use super::boards::BOARD;
+use super::wiring::{PinMode, Signal, Wire, wire_of};
 
-/// Bits of an absolute sensor.
+/// Bits of an absolute sensor on the bus.
 pub(super) const BITS: u32 = 14;
+/// Bits of the converter, which reads a potentiometer.
+pub(super) const WIPER_BITS: u32 = 12;
+/// The sensor that may be a potentiometer, and the pin of its wiper: channel B of the encoder in its place.
+const WIPER: usize = 1;
+const WIPER_SIGNAL: Signal = Signal::Encoder(WIPER as u8, b'B');
 
-/// Whether the rig has absolute sensors.
-pub(super) const ANY_IS_ABSOLUTE: bool = {
+/// Whether the rig has absolute sensors on the bus.
+pub(super) const ANY_IS_ON_BUS: bool = {
     let (mut any, mut sensor) = (false, 0);
     while sensor < SENSORS {
-        if is_absolute(sensor) {
+        if is_on_bus(sensor) {
             assert!(TABLE.limits.turn_counts[sensor] == 1 << BITS, "an absolute sensor of other bits");
             any = true;
         }
@@ -20,15 +26,33 @@ pub(super) const ANY_IS_ABSOLUTE: bool = {
     any
 };
 
+/// The wire of the wiper, if the rig has a potentiometer.
+pub(super) const WIPER_WIRE: Option<Wire> = if is_absolute(WIPER) && !is_on_bus(WIPER) {
+    let turn = TABLE.limits.turn_counts[WIPER];
+    assert!(turn > 1 << WIPER_BITS && turn < 2 << WIPER_BITS, "a potentiometer of other bits");
+    Some(wire_of(BOARD.wiring, WIPER_SIGNAL))
+} else {
+    None
+};
+
+/// Whether the rig has absolute sensors.
+pub(super) const ANY_IS_ABSOLUTE: bool = ANY_IS_ON_BUS || WIPER_WIRE.is_some();
+
 /// Whether a sensor of the rig is absolute.
 pub(super) const fn is_absolute(sensor: usize) -> bool {
-    sensor < SENSORS && TABLE.absolute.zero_counts[sensor] >= 0
+    sensor < SENSORS && TABLE.absolute.is_absolute(sensor)
+}
+
+/// Whether a sensor of the rig is on the bus. Only one may be a potentiometer.
+pub(super) const fn is_on_bus(sensor: usize) -> bool {
+    is_absolute(sensor) && (sensor != WIPER || !TABLE.absolute.is_potentiometer(&TABLE.limits, sensor))
 }
 
 /// Mode of a pin in this image; none, if it is left alone.
 pub(super) const fn mode(wire: Wire) -> Option<PinMode> {
     match wire.signal {
-        Signal::AngleSelect | Signal::AngleClock | Signal::AngleCommand if !ANY_IS_ABSOLUTE => None,
+        Signal::AngleSelect | Signal::AngleClock | Signal::AngleCommand if !ANY_IS_ON_BUS => None,
+        Signal::Encoder(1, b'B') if WIPER_WIRE.is_some() => Some(PinMode::Analog),
         Signal::Encoder(sensor, _) if is_absolute(sensor as usize) => Some(PinMode::Input),
         _ => Some(wire.mode),
     }

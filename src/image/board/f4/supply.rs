@@ -1,8 +1,10 @@
-//! The supply voltage of the power stage.
+//! The A/D converter: the supply voltage of the power stage, and the wiper of a potentiometer.
 
 use crate::pac::{ADC_COMMON, ADC1};
 
 use super::boards::BOARD;
+use super::sensors::WIPER_WIRE;
+use super::wiring::Wire;
 
 /// Input 12 is the supply, input 17 the internal reference (RM0090, 13.10).
 const SUPPLY: u8 = 12;
@@ -13,8 +15,17 @@ const CALIBRATION: *const u16 = 0x1fff_7a2a as *const u16;
 
 /// Iterations of the loop that waits for a conversion: at least 100 µs.
 const PATIENCE: u32 = 5_000;
+/// As above, in a tick: at least 6 µs.
+const PATIENCE_IN_A_TICK: u32 = 300;
 
-/// The A/D converter; it makes one conversion per tick.
+/// Input of the wiper, if there is one: 0 to 7 are PA0 to PA7 (datasheet, pin definitions).
+const WIPER: Option<u8> = match WIPER_WIRE {
+    Some(Wire { port: b'A', pin: pin @ 0..=7, .. }) => Some(pin),
+    Some(_) => panic!("this pin is no input of the converter"),
+    None => None,
+};
+
+/// The A/D converter; it makes one conversion per tick, and one more for a potentiometer.
 pub(super) struct Supply {
     converter: ADC1,
     volts_per_step: f32,
@@ -28,6 +39,10 @@ impl Supply {
         common.ccr().write(|w| unsafe { w.adcpre().bits(0b01).tsvrefe().set_bit() });
         // Input 12 is sampled for 84 cycles, enough for 1 kΩ; input 17 for 480 cycles, which is 23 µs; it needs 10 µs.
         converter.smpr1().write(|w| unsafe { w.bits(0b100 << 6 | 0b111 << 21) });
+        if let Some(wiper) = WIPER {
+            // 56 cycles, enough for 10 kΩ (datasheet, equation 1).
+            converter.smpr2().write(|w| unsafe { w.bits(0b011 << (3 * u32::from(wiper))) });
+        }
         converter.sqr3().write(|w| unsafe { w.bits(REFERENCE.into()) });
         converter.cr2().write(|w| w.adon().set_bit());
         // Converter and reference need 3 µs and 10 µs to start (datasheet, tSTAB and tSTART).
@@ -38,8 +53,9 @@ impl Supply {
         supply.converter.sqr3().write(|w| unsafe { w.bits(SUPPLY.into()) });
         // SAFETY: the chip's own data; reading them has no side effect.
         let calibration = unsafe { CALIBRATION.read_volatile() };
-        supply.volts_per_step =
-            reference_v(calibration.into(), measured.unwrap_or_default()) * BOARD.supply_divider / 4096.0;
+        supply.volts_per_step = reference_v(calibration.into(), measured.unwrap_or_default() as f32)
+            * BOARD.supply_divider
+            / 4096.0;
         // For the first tick.
         supply.start_conversion();
         supply
@@ -50,15 +66,24 @@ impl Supply {
     }
 
     /// The result of a conversion, once it has ended; reading it clears the flag (13.13.1).
-    fn result(&self) -> Option<f32> {
+    fn result(&self) -> Option<u32> {
         let ended = self.converter.sr().read().eoc().bit_is_set();
-        ended.then(|| self.converter.dr().read().bits() as f32)
+        ended.then(|| self.converter.dr().read().bits())
     }
 
     /// The voltage measured in the previous tick (V); starts the next conversion, which takes 5 µs. If the converter
     /// has not finished, the voltage is 0 V.
-    pub(super) fn volts(&mut self) -> f32 {
-        let volts = self.result().unwrap_or_default() * self.volts_per_step;
+    ///
+    /// If there is a potentiometer, its reading goes to `wiper` before that; 0 if the converter has not finished.
+    pub(super) fn volts(&mut self, wiper: &mut u32) -> f32 {
+        let volts = self.result().unwrap_or_default() as f32 * self.volts_per_step;
+        if let Some(input) = WIPER {
+            // SAFETY: numbers of inputs.
+            self.converter.sqr3().write(|w| unsafe { w.bits(input.into()) });
+            self.start_conversion();
+            *wiper = (0..PATIENCE_IN_A_TICK).find_map(|_| self.result()).unwrap_or_default();
+            self.converter.sqr3().write(|w| unsafe { w.bits(SUPPLY.into()) });
+        }
         self.start_conversion();
         volts
     }

@@ -226,7 +226,7 @@ pub(crate) fn actuator(node: &Node<'_>, tick: &Tick) -> Result<Actuator, RigErro
     if let (Some(node), 1) = (table.get("driver_lag_s"), tick.delay_ticks) {
         return Err(node.out_of_range(
             "only with delay_ticks = 0",
-            "leave delay_ticks in [tick] out: a tick of delay beside a lag is not made up for",
+            "leave delay_ticks in [tick] out, and add a tick to driver_lag_s: a delay beside a lag is made up for as lag",
         ));
     }
     let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());

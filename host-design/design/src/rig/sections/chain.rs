@@ -209,7 +209,9 @@ fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
         return Err(links.wrong_length(entries.len(), &format!("1 to {MAX_LINKS}"), LINKS));
     }
     let gravity_m_per_s2 = root.get("gravity").map_or(Ok(GRAVITY_M_PER_S2), |node| gravity(&node))?;
-    let links = entries.iter().map(|entry| link::link(entry, gravity_m_per_s2)).collect::<Result<_, _>>()?;
+    let links = entries.iter().enumerate();
+    let links = links.map(|(index, entry)| link::link(entry, gravity_m_per_s2, index == 0));
+    let links = links.collect::<Result<_, _>>()?;
     Ok(Chain { cart, links, gravity_m_per_s2, input })
 }
 

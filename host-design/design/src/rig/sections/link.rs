@@ -1,6 +1,6 @@
 //! `[[link]]`: one link of a chain, from data sheets and drawings or from measurements of the link alone.
 
-use std::f64::consts::{LN_2, TAU};
+use std::f64::consts::{LN_2, PI, TAU};
 
 use serde::Serialize;
 
@@ -105,6 +105,13 @@ const LINK_KEYS: &[Key] = &[
         absent: Absent::Follows("no absolute sensor"),
     },
     Key {
+        name: "sensor_travel_rad",
+        unit: "rad",
+        rule: Rule::TRAVEL,
+        meaning: "angle over which a potentiometer reads from 0 to 2^sensor_bits; 1/64 at each end is not used",
+        absent: Absent::Follows("a whole turn: a magnetic sensor"),
+    },
+    Key {
         name: "sensor_zero_counts",
         unit: "counts",
         rule: Rule::WHOLE.worded("a whole number from 0 to below 2^sensor_bits"),
@@ -116,6 +123,13 @@ const LINK_KEYS: &[Key] = &[
         unit: "rad",
         rule: Rule::NOISE,
         meaning: "noise of this sensor besides the rounding to its bits, root mean square",
+        absent: Absent::Numbers(&[0.0]),
+    },
+    Key {
+        name: "sensor_delay_s",
+        unit: "s",
+        rule: Rule::NOT_NEGATIVE.worded("a number >= 0, with an encoder or sensor"),
+        meaning: "age of the reading of encoder or sensor at the tick, by its own filter and its bus; made up for",
         absent: Absent::Numbers(&[0.0]),
     },
 ];
@@ -135,6 +149,14 @@ pub struct Link {
     pub friction_n_m_s_per_rad: f64,
     /// Resolution of the joint's encoder.
     pub encoder: Option<LinkEncoder>,
+    /// Age of its reading at the tick (s).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub sensor_delay_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 /// Resolution of a joint encoder, in the form that the file gives.
@@ -146,8 +168,11 @@ pub enum LinkEncoder {
     CountsPerRev(f64),
     /// `sensor_bits`: an absolute sensor.
     Absolute {
-        /// Bits per turn.
+        /// Bits per turn, or of a potentiometer.
         bits: u8,
+        /// `sensor_travel_rad`: angle that a potentiometer reads (rad); none for a sensor that reads a whole turn.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        travel_rad: Option<f64>,
         /// `sensor_zero_counts`: reading while the links hang (counts).
         zero_counts: u32,
         /// `sensor_noise_rad`: noise besides rounding (rad, root mean square).
@@ -160,8 +185,11 @@ pub enum LinkEncoder {
 pub const MEASUREMENTS_OF_A_LINK: [&str; 4] =
     ["inertia_about_joint_kg_m2", "tip_mass_kg", "swing_period_s", "swing_half_life_s"];
 
-/// Reads one `[[link]]`.
-pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64) -> Result<Link, RigError> {
+/// Angle that a potentiometer reads beside hanging and beside upright, at least (rad).
+const BESIDE_RAD: f64 = 0.2;
+
+/// Reads one `[[link]]`; the lowest one turns half a turn from hanging to upright.
+pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64, is_lowest: bool) -> Result<Link, RigError> {
     const ONE_INERTIA: &str = "keep the one that you measured";
     let table = node.table(&LINK)?;
     table.not_both("inertia_kg_m2", "inertia_about_joint_kg_m2", ONE_INERTIA)?;
@@ -177,8 +205,14 @@ pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64) -> Result<Link, RigEr
         centre_of_mass_m,
         inertia_kg_m2: table.value("inertia_kg_m2")?,
         friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
-        encoder: link_encoder(&table)?,
+        encoder: link_encoder(&table, is_lowest)?,
+        sensor_delay_s: table.value("sensor_delay_s")?,
     };
+    if let (None, Some(node)) = (link.encoder, table.get("sensor_delay_s")) {
+        return Err(
+            node.out_of_range("only with an encoder or sensor", "describe it, or leave sensor_delay_s out")
+        );
+    }
     if let Some(about_joint) = table.value("inertia_about_joint_kg_m2")? {
         link.set_inertia_about_joint(&table, "inertia_about_joint_kg_m2", about_joint, |least| least)?;
     }
@@ -266,11 +300,11 @@ fn within_reach(table: &Table<'_>, centre_of_mass_m: Option<f64>, length_m: f64)
     }
 }
 
-fn link_encoder(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
+fn link_encoder(table: &Table<'_>, is_lowest: bool) -> Result<Option<LinkEncoder>, RigError> {
     table.not_both("encoder_step_rad", "encoder_counts_per_rev", "keep the one the data sheet gives")?;
     table.not_both("encoder_step_rad", "sensor_bits", "keep the one that the board reads")?;
     table.not_both("encoder_counts_per_rev", "sensor_bits", "keep the one that the board reads")?;
-    if let Some(absolute) = absolute_sensor(table)? {
+    if let Some(absolute) = absolute_sensor(table, is_lowest)? {
         return Ok(Some(absolute));
     }
     let step: Option<f64> = table.value("encoder_step_rad")?;
@@ -278,10 +312,11 @@ fn link_encoder(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
     Ok(step.map(LinkEncoder::StepRad).or(counts.map(LinkEncoder::CountsPerRev)))
 }
 
-fn absolute_sensor(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
+fn absolute_sensor(table: &Table<'_>, is_lowest: bool) -> Result<Option<LinkEncoder>, RigError> {
     let Some(bits) = table.value::<Option<f64>>("sensor_bits")? else {
-        let needs_bits =
-            ["sensor_zero_counts", "sensor_noise_rad"].iter().any(|key| table.get(key).is_some());
+        let needs_bits = ["sensor_travel_rad", "sensor_zero_counts", "sensor_noise_rad"]
+            .iter()
+            .any(|key| table.get(key).is_some());
         return match needs_bits {
             true => Err(table.missing("sensor_bits", "the bits per turn of the absolute sensor")),
             false => Ok(None),
@@ -294,8 +329,34 @@ fn absolute_sensor(table: &Table<'_>) -> Result<Option<LinkEncoder>, RigError> {
         let remedy = "give what the sensor reads while the links hang, or correct sensor_bits";
         return Err(table.required("sensor_zero_counts")?.out_of_range(&accepts, remedy));
     }
-    let noise_rad = table.value("sensor_noise_rad")?;
-    Ok(Some(LinkEncoder::Absolute { bits: bits as u8, zero_counts: zero_counts as u32, noise_rad }))
+    let (travel_rad, noise_rad) = (table.value("sensor_travel_rad")?, table.value("sensor_noise_rad")?);
+    if let Some(travel_rad) = travel_rad {
+        within_travel(table, turn, travel_rad, is_lowest)?;
+    }
+    Ok(Some(LinkEncoder::Absolute {
+        bits: bits as u8,
+        travel_rad,
+        zero_counts: zero_counts as u32,
+        noise_rad,
+    }))
+}
+
+/// A potentiometer has to read where its link hangs and where it is upright, and some way to both sides.
+fn within_travel(table: &Table<'_>, range: f64, travel_rad: f64, is_lowest: bool) -> Result<(), RigError> {
+    let counts = |angle_rad: f64| (angle_rad * range / travel_rad).ceil();
+    let (half, end) = (if is_lowest { counts(PI) } else { 0.0 }, range / 64.0 + counts(BESIDE_RAD));
+    let ranges = [[end, range - 1.0 - end - half], [end + half, range - 1.0 - end]];
+    let zero: f64 = table.value("sensor_zero_counts")?;
+    if ranges.iter().any(|[low, high]| (low..=high).contains(&&zero)) {
+        return Ok(());
+    }
+    let [[a, b], [c, d]] = ranges;
+    let accepts = match is_lowest {
+        true => format!("a whole number from {a} to {b} or from {c} to {d}"),
+        false => format!("a whole number from {a} to {d}"),
+    };
+    let remedy = "turn the potentiometer so that it reads where the link hangs and where it is upright";
+    Err(table.required("sensor_zero_counts")?.out_of_range(&accepts, remedy))
 }
 
 #[cfg(test)]

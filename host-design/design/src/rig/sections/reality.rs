@@ -96,6 +96,9 @@ keys! {
             "speed at which 71 % of that force is left", Absent::Follows("the force does not fall");
         bandwidth_hz: Option<f64>, "Hz", Rule::POSITIVE,
             "real bandwidth of a servo", Absent::Follows("that of [actuator]");
+        servo_damping_percent: Option<f64>, "%", Rule::PERCENT,
+            "damping of a servo of second order, whose natural frequency is the bandwidth",
+            Absent::Follows("it is of first order");
         motor_damping_percent: f64, "%", Rule::NOT_NEGATIVE,
             "damping of the motor's resonance with the cart", Absent::Numbers(&[10.0]);
     }
@@ -114,7 +117,7 @@ keys! {
         twice_per_turn_phase_rad: PerJoint, "rad", EACH_ANGLE,
             "phase of that error when the joint is straight", NONE;
         sensor_delay_s: PerJoint, "s", EACH_NOT_NEGATIVE,
-            "age of each joint sensor's reading, by its own filter and its bus", NONE;
+            "age of each joint sensor's reading, in addition to that of its [[link]]", NONE;
         rail_tilt_rad: f64, "rad", Rule::SIGNED_ANGLE, "slope of the rail, positive if it rises towards +x", NONE;
     }
 }
@@ -241,6 +244,10 @@ fn step_motor(table: &Table<'_>, motor: &StepMotorData, chain: &Chain) -> Result
     {
         let accepts = "only with kind = \"acceleration\" in [actuator]";
         return Err(table.required(key.name)?.out_of_range(accepts, "leave it out, or describe a stepper"));
+    }
+    if let (Some(node), None) = (table.get("servo_damping_percent"), motor.bandwidth_hz) {
+        let remedy = "give its natural frequency as bandwidth_hz in [reality], or leave it out";
+        return Err(node.out_of_range("only with bandwidth_hz", remedy));
     }
     match table.get("holding_force_n") {
         None if chain.input == CartInput::Acceleration => table.refuse_for_acceleration(&[

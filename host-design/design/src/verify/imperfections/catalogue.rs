@@ -160,7 +160,7 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
         unit: "s",
         typical: [1e-4, 1e-3],
         source: "data sheets: 96 µs (AS5045, AS5046; slow 384 µs), to a filter or a slow bus (estimate)",
-        remedy: "SPI instead of I²C; a faster clock of the bus; less filter in the sensor",
+        remedy: "sensor_delay_s in [[link]], which is made up for; SPI instead of I²C; a faster clock of the bus",
         requirement: "runs with the motor on (sensor_delay_s)",
         required: |verify| verify.sensor_delay_s,
         set: |reality, size| reality.sensors.sensor_delay_s = PerJoint::all(size),

@@ -83,6 +83,11 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
         values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.bandwidth_hz)))),
     },
     TrustQuantity {
+        name: "least bandwidth, order 2",
+        meaning: "the same for a servo of second order, damping ratio 0.7",
+        values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.second_order_hz?)))),
+    },
+    TrustQuantity {
         name: "largest bandwidth",
         meaning: "how fast a servo may really be whose lag is made up for",
         values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.largest_bandwidth_hz?)))),

@@ -9,6 +9,7 @@ use upright_design::rig::{Cart, Chain, Link};
 /// A uniform rod without friction.
 pub(crate) fn rod(mass_kg: f64, length_m: f64) -> Link {
     Link {
+        sensor_delay_s: 0.0,
         mass_kg,
         length_m,
         centre_of_mass_m: None,
@@ -56,6 +57,7 @@ pub(crate) fn with_friction(mut chain: Chain, factor: f64) -> Chain {
 pub(crate) fn any_link() -> impl Strategy<Value = Link> {
     let given = prop::option::of((0.1..1.0f64, 0.01..0.3f64));
     (0.01..1.0f64, 0.05..1.0f64, given, 0.0..0.01f64).prop_map(|(mass, length, given, friction)| Link {
+        sensor_delay_s: 0.0,
         centre_of_mass_m: given.map(|(where_on_it, _)| where_on_it * length),
         inertia_kg_m2: given.map(|(_, share)| share * mass * length * length),
         friction_n_m_s_per_rad: friction,

@@ -1,5 +1,6 @@
 //! The image that is flashed, on the virtual board.
 
+mod absolute;
 mod compared;
 mod cycles;
 mod places;

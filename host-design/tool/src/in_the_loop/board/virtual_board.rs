@@ -6,7 +6,6 @@ use std::rc::Rc;
 
 use upright::board::{Contacts, Output};
 use upright::control::actuator::Drive;
-use upright::control::encoder::AbsoluteSensor;
 use upright::protocol::simulated_pins::InjectedFault;
 use upright::protocol::{BAUD, telemetry_ticks};
 use upright_board::{
@@ -17,8 +16,8 @@ use upright_design::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
 
+use super::absolute::AbsoluteAtPins;
 use super::pulse_count::{PulseCount, PulseWatch};
-use crate::image::BoardName;
 
 /// Inputs change this long before a tick.
 const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
@@ -82,8 +81,7 @@ pub struct VirtualBoard {
     /// Position of each encoder (edges).
     positions: Vec<i64>,
     counters: Option<Vec<u32>>,
-    /// What the image makes of the readings of each absolute sensor.
-    angles: Vec<Option<AbsoluteSensor>>,
+    absolute: Vec<Option<AbsoluteAtPins>>,
     contacts: Option<Contacts>,
     supply_v: Option<f32>,
     outgoing: VecDeque<u8>,
@@ -121,8 +119,6 @@ impl VirtualBoard {
         let mut board =
             SimulatedBoard::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
-        let is_absolute = table.absolute.zero_counts.iter().map(|&zero| zero >= 0);
-        let angles = is_absolute.map(|is| is.then(|| AbsoluteSensor::new(BoardName::ANGLE_BITS)));
         let pulses = table.steps.map(|_| PulseCount::default());
         if pulses.is_some() {
             board.record_pulses();
@@ -135,7 +131,7 @@ impl VirtualBoard {
             tick_s: f64::from(table.tick_s),
             positions: vec![0; table.sensors()],
             counters: None,
-            angles: angles.collect(),
+            absolute: (0..table.sensors()).map(|sensor| AbsoluteAtPins::of(table, sensor)).collect(),
             contacts: None,
             supply_v: None,
             outgoing: VecDeque::new(),
@@ -209,7 +205,8 @@ impl VirtualBoard {
         let counts = (0..).zip(&self.positions).map(|(sensor, &position)| {
             let pulses = self.pulses.as_ref().filter(|_| sensor == 0);
             let count = pulses.map_or(position as u32, |pulses| pulses.before);
-            Bench::reading(sensor, count)
+            let mark = self.absolute[sensor].as_ref().map_or(0, |absolute| absolute.mark(position));
+            Bench::reading(sensor, count) | mark
         });
         Pins {
             raw_counts: counts.collect(),
@@ -255,20 +252,13 @@ impl VirtualBoard {
 
     /// Turns the shafts to the positions of the counters, at once, since the image reads them only in a tick.
     fn turn(&mut self, counts: &[u32]) {
-        for (encoder, (angle, &count)) in self.angles.iter_mut().zip(counts).enumerate() {
-            let Some(angle) = angle else { continue };
-            let reading = count as u16 & ((1 << BoardName::ANGLE_BITS) - 1);
-            self.board.apply(Input::Angle { encoder, reading });
-            if let Some(position) = self.positions.get_mut(encoder) {
-                *position = i64::from(angle.count(reading.into()) as i32);
-            }
-        }
         let before = self.counters.replace(counts.to_vec()).unwrap_or_else(|| counts.to_vec());
         let end = self.board.now();
         for (encoder, ((&count, &before), position)) in
             counts.iter().zip(&before).zip(&mut self.positions).enumerate()
         {
-            if self.angles.get(encoder).is_some_and(Option::is_some) {
+            if let Some(Some(absolute)) = self.absolute.get_mut(encoder) {
+                *position = absolute.show(&mut self.board, encoder, count);
                 continue;
             }
             let moved = count.wrapping_sub(before);
