@@ -70,7 +70,7 @@ fn other_laws_of_friction_are_drawn_for_the_same_machines() {
     }
 }
 
-/// With the channels weighted by the residuals of the first fit, the wiring of the file fits worse than an encoder with half the counts.
+/// Its first fit weighs the channels so that an encoder with half the counts fits better.
 #[test]
 fn a_machine_whose_fit_is_slow_is_not_accused_of_its_wiring() {
     let drawn = Drawn { seconds: 20.0, seed: 1, trust_wiring: false, ..DRAWN };
