@@ -122,24 +122,15 @@ impl Board<SENSORS> for F4Board {
         if let ([steps], [pulses, ..]) = (self.steps.as_mut_slice(), raw_counts.as_mut_slice()) {
             (*pulses, is_late) = (steps.given(), steps.was_late());
         }
-        let mut bad = self.angles.first_mut().map_or(0, |angles| angles.read(&mut raw_counts));
-        let mut wiper = 0;
-        let supply_v = self.supply.volts(&mut wiper);
-        if let (true, [_, count, ..]) = (WIPER_WIRE.is_some(), raw_counts.as_mut_slice()) {
-            // In its dead band, with an open wire or with a short circuit.
-            bad |= u32::from(is_at_end(wiper, WIPER_BITS)) << 1;
-            *count = wiper;
-        }
-        if let [samples] = self.bad.as_mut_slice() {
-            samples.now = bad;
-        }
+        let (mut bad, mut wiper) =
+            (self.angles.first_mut().map_or(0, |angles| angles.read(&mut raw_counts)), 0);
         // Clears the flag of the current tick.
         let _ = tick_is_due();
         let [limit_low, limit_high] = pins::limits();
         let [was_low, was_high] = self.limits;
-        Inputs {
+        let mut inputs = Inputs {
             raw_counts,
-            supply_v,
+            supply_v: self.supply.volts(&mut wiper),
             contacts: Contacts {
                 // A contact counts only if it was open at the end of the previous tick, too: a spike that a wire picks
                 // up from the switching bridge must not trip.
@@ -153,7 +144,16 @@ impl Board<SENSORS> for F4Board {
                     | self.motor.has_failed()
                     | guard::supply_was_low(&self.power, &self.exti),
             },
+        };
+        if let (true, [_, count, ..]) = (WIPER_WIRE.is_some(), inputs.raw_counts.as_mut_slice()) {
+            // In its dead band, with an open wire or with a short circuit.
+            bad |= u32::from(is_at_end(wiper, WIPER_BITS)) << 1;
+            *count = wiper;
         }
+        if let [samples] = self.bad.as_mut_slice() {
+            samples.now = bad;
+        }
+        inputs
     }
 
     fn bad_samples(&mut self) -> Option<&mut BadSamples> {
