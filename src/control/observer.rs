@@ -10,7 +10,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
     /// Whether sensor i measures state 2i, as in every chain, and as it is in this tick. Then no index has to be looked
     /// up.
     fn sensors_are_in_order(&self) -> bool {
-        let of_this_tick = self.delay_s.iter().all(|&delay_s| delay_s == T::default());
+        let of_this_tick = self.delay_s.data.0[0].iter().all(|&delay_s| delay_s == T::default());
         of_this_tick && self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
     }
 
@@ -81,23 +81,36 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     /// What the sensors measure, `C x̂` (m or rad): each its state, less what it has moved since an old reading.
     #[inline(always)]
     pub(crate) fn measured(&self, estimate: &[T; NX]) -> [T; NY] {
-        if self.is_in_order {
-            select(|sensor| 2 * sensor, estimate)
-        } else {
-            self.measured_looking_up(estimate)
+        if !self.is_in_order {
+            return self.measured_looking_up(estimate);
         }
+        let mut measured = [T::default(); NY];
+        for (sensor, measured) in measured.iter_mut().enumerate() {
+            *measured = estimate.get(2 * sensor).copied().unwrap_or_default();
+        }
+        measured
     }
 
     #[cold]
     #[inline(never)]
     fn measured_looking_up(&self, estimate: &[T; NX]) -> [T; NY] {
-        let state = |sensor: usize| self.gains.measured.get(sensor).map_or(NX, |&state| state as usize);
-        let mut measured: [T; NY] = select(state, estimate);
-        let rates: [T; NY] = select(|sensor| state(sensor) + 1, estimate);
-        for ((measured, delay_s), rate) in measured.iter_mut().zip(&self.gains.delay_s).zip(rates) {
-            *measured -= *delay_s * rate;
+        let mut measured = [T::default(); NY];
+        for (sensor, measured) in measured.iter_mut().enumerate() {
+            *measured = self.looked_up(sensor, estimate);
         }
         measured
+    }
+
+    /// What a sensor measures. Not inlined into the unrolled loop over the sensors, it takes half of the code.
+    #[inline(never)]
+    fn looked_up(&self, sensor: usize, estimate: &[T; NX]) -> T {
+        let of = |sensor: usize| Some((*self.gains.measured.get(sensor)?, *self.gains.delay_s.get(sensor)?));
+        // A checked table names only states that exist.
+        match of(sensor).and_then(|(state, delay_s)| Some((estimate.get(state as usize..)?, delay_s))) {
+            Some(([value, rate, ..], delay_s)) => *value - delay_s * *rate,
+            Some(([value], _)) => *value,
+            _ => T::default(),
+        }
     }
 
     /// Replaces the prediction x̂⁻ by the current estimate `x̂ = x̂⁻ + L e`. Calls `corrected` for each joint, with
@@ -185,20 +198,6 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
             }
         }
     }
-}
-
-/// `C x̂`; `measured` maps a sensor to its state.
-#[inline(always)]
-fn select<const NX: usize, const NY: usize, T: Scalar>(
-    measured: impl Fn(usize) -> usize,
-    estimate: &[T; NX],
-) -> [T; NY] {
-    let mut selected = [T::default(); NY];
-    for (sensor, selected) in selected.iter_mut().enumerate() {
-        // A checked table names only states that exist.
-        *selected = estimate.get(measured(sensor)).copied().unwrap_or_default();
-    }
-    selected
 }
 
 #[cfg(test)]

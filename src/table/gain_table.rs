@@ -110,7 +110,10 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && !(self.steps.is_some() && (self.motor.is_some() || self.pending_acts > 0.0))
             && self.limits.is_sound()
             && self.thresholds.is_sound()
-            && self.observer.iter().flat_map(|observer| &observer.delay_s).all(|&delay_s| delay_s >= 0.0);
+            && self
+                .observer
+                .iter()
+                .all(|observer| observer.delay_s.data.0[0].iter().all(|&delay_s| delay_s >= 0.0));
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }
