@@ -33,7 +33,7 @@ struct Machine {
     /// The sensor with its last good angle.
     link: AbsoluteSensor,
     count: u32,
-    bad: BadSamples,
+    bad: BadSamples<2>,
 }
 
 impl Board<2> for Machine {
@@ -53,7 +53,7 @@ impl Board<2> for Machine {
         Inputs { raw_counts: [self.cart, self.count], supply_v: 24.0, contacts: Contacts::default() }
     }
 
-    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+    fn bad_samples(&mut self) -> Option<&mut BadSamples<2>> {
         Some(&mut self.bad)
     }
 

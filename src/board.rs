@@ -57,16 +57,25 @@ pub struct Inputs<const NY: usize> {
 
 /// Samples that a board knows to be bad, by parity, an error flag or the end of a range. What the observer predicts
 /// takes the place of a bad sample; the third in a row of a sensor is
-/// [`Fault::Encoder`](crate::supervision::fault::Fault::Encoder).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct BadSamples {
+/// [`Fault::Encoder`](crate::supervision::fault::Fault::Encoder). The reading of a noisy sensor that stays the same is
+/// [`Fault::Frozen`](crate::supervision::fault::Fault::Frozen).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BadSamples<const NY: usize> {
     /// The sensors whose samples are bad in this tick: bit i for sensor i.
     pub now: u32,
     /// Those of the ticks before, the latest first.
     before: [u32; 2],
+    /// Last reading of each sensor, and the ticks for which it has been the same.
+    readings: [(u32, u16); NY],
 }
 
-impl BadSamples {
+impl<const NY: usize> Default for BadSamples<NY> {
+    fn default() -> Self {
+        Self { now: 0, before: [0; 2], readings: [(0, 0); NY] }
+    }
+}
+
+impl<const NY: usize> BadSamples<NY> {
     /// Ends a tick: the next one is good. Returns the first sensor whose samples were bad in all of the last ticks.
     pub(crate) fn finish(&mut self) -> Option<u8> {
         let bad = core::mem::take(&mut self.now);
@@ -74,6 +83,16 @@ impl BadSamples {
         self.before.rotate_right(1);
         self.before[0] = bad;
         (lost != 0).then(|| lost.trailing_zeros() as u8)
+    }
+
+    /// Counts the ticks for which each reading has been the same, in a row; from 0 if `anew`. Returns them.
+    pub(crate) fn equal_ticks(&mut self, raw_counts: &[u32; NY], anew: bool) -> [u16; NY] {
+        let mut ticks = [0; NY];
+        for ((last, &reading), ticks) in self.readings.iter_mut().zip(raw_counts).zip(&mut ticks) {
+            *ticks = if anew || last.0 != reading { 0 } else { last.1.saturating_add(1) };
+            *last = (reading, *ticks);
+        }
+        ticks
     }
 }
 
@@ -148,7 +167,7 @@ pub trait Board<const NY: usize> {
 
     /// The samples of the last [`inputs`](Self::inputs) that are known to be bad; none, if the board cannot tell:
     /// then a tick does not pay for it.
-    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+    fn bad_samples(&mut self) -> Option<&mut BadSamples<NY>> {
         None
     }
 

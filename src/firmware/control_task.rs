@@ -57,8 +57,8 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         let bad = self.board.bad_samples();
         let lost = bad.and_then(|bad| self.firmware.replace_bad_samples(&mut inputs, bad));
         self.firmware.accept(&inputs);
-        if let Some(sensor) = lost {
-            self.firmware.lose_sensor(sensor);
+        if let Some(found) = lost {
+            self.firmware.lose_sensor(found);
         }
         let output = act(&mut self.firmware, &inputs);
         self.board.drive(output);

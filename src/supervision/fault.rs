@@ -166,7 +166,8 @@ impl Fault {
             fault: Fault::Frozen,
             name: "frozen encoder",
             condition: "an encoder stands still while the model moves it by a seventh of its threshold per tick or more; while \
-                        balancing with a force, also if its wire is open; slower motion is found later",
+                        balancing with a force, also if its wire is open; slower motion is found later, of a noisy \
+                        absolute sensor within 0.2 s",
             reaction: Reaction::Ticks(10),
             remedy: "check plug, wire and coupling of this encoder, and on a stepper the drive; home, and check the signs \
                      again",

@@ -62,7 +62,7 @@ unsafe extern "C" {
 /// The board of the program in C.
 #[derive(Default)]
 struct CBoard {
-    bad: BadSamples,
+    bad: BadSamples<SENSORS>,
 }
 
 impl Board<SENSORS> for CBoard {
@@ -105,7 +105,7 @@ impl Board<SENSORS> for CBoard {
         }
     }
 
-    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+    fn bad_samples(&mut self) -> Option<&mut BadSamples<SENSORS>> {
         Some(&mut self.bad)
     }
 

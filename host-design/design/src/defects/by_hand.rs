@@ -10,7 +10,7 @@ use super::defect::{Defect, Needs};
 use super::expected::Expected;
 use super::expected::Phase;
 use super::injection::Injection;
-use super::trial::{Trial, absolute, first_encoder};
+use super::trial::{Trial, able, first_encoder};
 
 /// A defect in a running rig, injected tick by tick.
 pub struct Defective<'a> {
@@ -54,7 +54,7 @@ impl Trial {
         let sensor = match kind {
             Defect::CartEncoderFrozen => 0,
             Defect::LinkEncoderFrozen => sensor.clamp(1, sensors.max(2) - 1),
-            kind if kind.is_of_absolute() => absolute(kind, table, sensor),
+            kind if kind.is_of_some_sensors() => able(kind, table, sensor),
             Defect::EncodersSwapped => sensor.min(sensors.saturating_sub(2)).max(first),
             _ => sensor.min(sensors.saturating_sub(1)).max(first),
         };

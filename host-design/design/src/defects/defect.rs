@@ -118,7 +118,7 @@ defects! {
     SampleInvalid SimulatedPins "a board knows that all readings of an absolute sensor are bad" => Fault(F::Encoder, Exactly(3));
     SensorWire Board "the data wire of an absolute sensor is open, or has a short circuit" => Fault(F::Encoder, Exactly(3));
     MagnetMissing Board "the magnet of an absolute sensor is missing, which the sensor says" => Fault(F::Encoder, Exactly(3));
-    FrameBit Board "a bit of an absolute sensor's frame, parity and error flag included, is wrong in one of 5 to 50 ticks" => Bounded;
+    FrameBit Board "a bit of an absolute sensor's frame, parity and error flag included, is wrong in one of 5 to 50 ticks" => Counted;
 }
 
 impl Defect {
@@ -153,6 +153,11 @@ impl Defect {
         let without_frames =
             matches!(self, Self::SensorDead | Self::SensorBit | Self::SampleInvalid | Self::SensorWire);
         without_frames || self.is_of_frames()
+    }
+
+    /// Whether not every sensor can have it: only absolute ones, or only encoders.
+    pub fn is_of_some_sensors(self) -> bool {
+        self.is_of_absolute() || self == Self::EncoderWireOpen
     }
 
     /// Whether only an absolute sensor on a bus can have it.

@@ -62,20 +62,25 @@ impl Defect {
             Self::CartJammed | Self::PulsesMissing | Self::SomePulsesMissing | Self::StepsLost => {
                 table.steps.is_some()
             }
-            kind if kind.is_of_absolute() => (0..table.sensors()).any(|sensor| kind.can_have(table, sensor)),
+            kind if kind.is_of_some_sensors() => {
+                (0..table.sensors()).any(|sensor| kind.can_have(table, sensor))
+            }
             _ => true,
         }
     }
 
-    /// Whether this sensor can have it, which only absolute sensors have.
+    /// Whether this sensor can have it, which not every sensor has.
     fn can_have(self, table: &TableValues, sensor: usize) -> bool {
+        if self == Self::EncoderWireOpen {
+            return sensor >= first_encoder(table) && !table.absolute.is_absolute(sensor);
+        }
         let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
         table.absolute.is_absolute(sensor) && !(self.is_of_frames() && is_potentiometer)
     }
 }
 
-/// The first sensor from `sensor` on, in turn, that can have a defect of absolute sensors.
-pub(super) fn absolute(kind: Defect, table: &TableValues, sensor: usize) -> usize {
+/// The first sensor from `sensor` on, in turn, that can have a defect that not every sensor has.
+pub(super) fn able(kind: Defect, table: &TableValues, sensor: usize) -> usize {
     let all = (0..table.sensors()).cycle().skip(sensor);
     all.take(table.sensors()).find(|&sensor| kind.can_have(table, sensor)).unwrap_or(sensor)
 }
@@ -119,7 +124,7 @@ impl Trial {
             Defect::CartEncoderFrozen => 0,
             Defect::LinkEncoderFrozen => random.random_range(1..sensors.max(2)),
             Defect::EncodersSwapped => random.random_range(first..sensors.saturating_sub(1).max(first + 1)),
-            kind if kind.is_of_absolute() => absolute(kind, table, random.random_range(first..sensors)),
+            kind if kind.is_of_some_sensors() => able(kind, table, random.random_range(first..sensors)),
             _ => random.random_range(first..sensors),
         };
         let trial = Self {

@@ -136,7 +136,7 @@ impl<'q, 't, S: SwingUp<NX, NY>, const NX: usize, const NY: usize> InProcess<'q,
 /// The board: inputs and output in memory.
 struct Wires<const NY: usize> {
     inputs: Inputs<NY>,
-    bad: BadSamples,
+    bad: BadSamples<NY>,
     output: Output,
     tick_s: f32,
 }
@@ -153,7 +153,7 @@ impl<const NY: usize> Board<NY> for Wires<NY> {
         self.inputs
     }
 
-    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+    fn bad_samples(&mut self) -> Option<&mut BadSamples<NY>> {
         Some(&mut self.bad)
     }
 

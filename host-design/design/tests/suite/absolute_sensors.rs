@@ -105,22 +105,29 @@ fn noise_of_a_sensor_reaches_observer_thresholds_and_verify() {
     assert!(ripple(&noisy) > 2.0 * ripple(&quiet), "{} {}", ripple(&noisy), ripple(&quiet));
 }
 
-/// What the supervisor says of samples of a link that are bad in these ticks after the release, and how far any link
-/// leans in 2000 ticks (rad).
+/// As [`with_readings`], with samples of a link that are bad in these ticks.
 fn with_bad_samples(
     rig: &Rig,
     sensor: usize,
     is_bad: impl Fn(u32) -> bool,
 ) -> (Option<Cause>, u32, u32, f64) {
+    with_readings(rig, |tick, raw_counts| {
+        if is_bad(tick) {
+            raw_counts[sensor] ^= BAD_SAMPLE | 0x1234;
+        }
+    })
+}
+
+/// What the supervisor says if the readings are changed in the ticks after the release, in how many of 2000 ticks the
+/// motor is on, the number of rejected samples, and how far any link leans (rad).
+fn with_readings(rig: &Rig, mut change: impl FnMut(u32, &mut [u32])) -> (Option<Cause>, u32, u32, f64) {
     let (values, scenario) = (table(rig), Scenario::at_rest(rig, Law::Lqr));
     let watched = balancing(rig, &values, &scenario, |harness| {
         let (mut lean_rad, mut ticks) = (0.0f64, 0);
         let before = rejected(harness);
         for tick in 0..2000 {
             let mut inputs = harness.inputs();
-            if is_bad(tick) {
-                inputs.raw_counts[sensor] ^= BAD_SAMPLE | 0x1234;
-            }
+            change(tick, &mut inputs.raw_counts);
             let output = harness.session.tick(&inputs).unwrap();
             harness.bench.tick(output.drive);
             if !output.enable {
@@ -157,6 +164,26 @@ fn the_prediction_takes_the_place_of_bad_samples_and_the_third_in_a_row_is_a_fau
             assert_eq!((found, ticks), (Some((Fault::Encoder, Some(sensor as u8))), 102), "{name}");
         }
     }
+}
+
+#[test]
+fn a_noisy_sensor_that_stands_still_is_found_within_a_fifth_of_a_second_and_one_without_noise_later() {
+    let held = |noise_rad: f64| {
+        let rig = absolute("single-quanser-ip02", noise_rad);
+        let most = 100 + (0.2 / rig.tick.period_s).ceil() as u32 + 1;
+        let mut reading = None;
+        let (cause, ticks, ..) = with_readings(&rig, |tick, raw_counts| {
+            if tick >= 100 {
+                raw_counts[1] = *reading.get_or_insert(raw_counts[1]);
+            }
+        });
+        (cause.map(|cause| (cause.fault, cause.sensor)), ticks, most)
+    };
+    let (found, ticks, most) = held(1.05e-3);
+    assert!(found == Some((Fault::Frozen, Some(1))) && (101..=most).contains(&ticks), "{found:?} {ticks}");
+    // Negative control: noise of a quarter of a count proves nothing.
+    let (found, ticks, most) = held(1e-4);
+    assert!(ticks > most, "{found:?} {ticks}");
 }
 
 #[test]

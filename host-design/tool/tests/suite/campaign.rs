@@ -72,6 +72,10 @@ fn defects_of_absolute_sensors_are_found_or_survived_and_only_they_have_them() {
             println!("{name}: {row:?}");
             assert!(row.wrong.is_empty() && row.runs == 20, "{name}: {row:?}");
         }
+        // A reading that stands still is proved by the noise that it lacks; only encoders have two wires.
+        for row in run(&on_host(rig, table), &[Defect::LinkEncoderFrozen, Defect::EncoderWireOpen], 80).rows {
+            assert!(row.missed == 0 && row.false_alarms == 0, "{name}: {row:?}");
+        }
         // Negative control: without detection, a sensor that reads nothing is missed.
         let blind = Setup { detection: false, ..on_host(rig, table) };
         assert_eq!(run(&blind, &[Defect::SensorDead], 4).rows[0].missed, 4, "{name}");

@@ -45,7 +45,7 @@ pub(crate) struct F4Board {
     /// One, if the rig has absolute sensors on the bus.
     angles: [Angles; ANY_IS_ON_BUS as usize],
     /// One, if the rig has absolute sensors.
-    bad: [BadSamples; ANY_IS_ABSOLUTE as usize],
+    bad: [BadSamples<SENSORS>; ANY_IS_ABSOLUTE as usize],
     supply: Supply,
     exti: EXTI,
     power: PWR,
@@ -156,7 +156,7 @@ impl Board<SENSORS> for F4Board {
         inputs
     }
 
-    fn bad_samples(&mut self) -> Option<&mut BadSamples> {
+    fn bad_samples(&mut self) -> Option<&mut BadSamples<SENSORS>> {
         self.bad.first_mut()
     }
 
