@@ -117,7 +117,7 @@ keys! {
         twice_per_turn_phase_rad: PerJoint, "rad", EACH_ANGLE,
             "phase of that error when the joint is straight", NONE;
         sensor_delay_s: PerJoint, "s", EACH_NOT_NEGATIVE,
-            "age of each joint sensor's reading, in addition to that of its [[link]]", NONE;
+            "age of each joint sensor's reading, in addition to the stated one", NONE;
         rail_tilt_rad: f64, "rad", Rule::SIGNED_ANGLE, "slope of the rail, positive if it rises towards +x", NONE;
     }
 }
