@@ -141,9 +141,9 @@ impl Record {
             if to < ticks.len() && goes_on(to) {
                 continue;
             }
-            if (to - from) as f64 * rig.tick.period_s >= SHORTEST_PIECE_S {
-                let to = to - most_late;
-                let samples = (from..to).step_by(self.stride);
+            let read_to = to.saturating_sub(most_late).max(from);
+            if (read_to - from) as f64 * rig.tick.period_s >= SHORTEST_PIECE_S {
+                let samples = (from..read_to).step_by(self.stride);
                 let positions =
                     samples.flat_map(|index| late.iter().enumerate().map(move |late| (index, late)));
                 let y = positions.map(|(index, (channel, late))| {
@@ -153,7 +153,7 @@ impl Record {
                         if late.fract() > 0.0 { late.fract() * (read(first + 1) - read(first)) } else { 0.0 };
                     (read(first) + further) * self.steps[channel]
                 });
-                self.pieces.push(Piece { y: y.collect(), drive: (from..to).map(drive).collect() });
+                self.pieces.push(Piece { y: y.collect(), drive: (from..read_to).map(drive).collect() });
             }
             from = to;
         }

@@ -164,6 +164,11 @@ fn logs_that_say_nothing_are_refused() {
     let mut short = Log::new(log().header.clone());
     log().ticks()[..3000].iter().enumerate().for_each(|(at, tick)| short.push(*tick, log().counts(at)));
     assert!(matches!(run(&file, &short, &TRUSTED), Err(IdentifyError::TooShort { .. })));
+    // Readings that are older than the log.
+    let text =
+        std::fs::read_to_string(FILE).unwrap().replacen("[[link]]", "[[link]]\nsensor_delay_s = 99", 1);
+    let old = Rig::from_toml(&text, Path::new(FILE)).unwrap();
+    assert!(matches!(run(&old, log(), &TRUSTED), Err(IdentifyError::TooShort { .. })));
     for name in ["single-quanser-ip02", "triple-glueck-eder-kugi"] {
         let other = Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap();
         assert!(matches!(run(&other, log(), &TRUSTED), Err(IdentifyError::OtherRig { .. })));
