@@ -41,7 +41,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Control period (s).
     tick_s: TICK_S,
     // Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
-    // later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ.
+    // later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ, and up to 1.2 with both.
     pending_acts: 0.0,
     // Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
     pending_stays: 0.0,

@@ -32,7 +32,7 @@ part! {
         /// Control period (s).
         pub tick_s: T,
         /// Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
-        /// later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ.
+        /// later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ, and up to 1.2 with both.
         pub pending_acts: T,
         /// Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
         pub pending_stays: T,
@@ -93,7 +93,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
         }
-        if [self.pending_acts, self.pending_stays].iter().any(|share| !(0.0..=1.0).contains(share)) {
+        if !(0.0..=1.25).contains(&self.pending_acts) || !(0.0..=1.0).contains(&self.pending_stays) {
             return Err(TableError::Delay);
         }
         let mut measured = self.observer.iter().flat_map(|observer| &observer.measured);

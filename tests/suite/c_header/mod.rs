@@ -113,7 +113,7 @@ fn the_header_has_the_bits_of_the_firmware_with_every_rig_and_law_however_it_is_
 }
 
 /// Rigs with what none of the published ones has: delay, lag, integral, known friction, old readings.
-fn variants() -> [(&'static str, Rig); 6] {
+fn variants() -> [(&'static str, Rig); 7] {
     let single = rig("single-quanser-ip02");
     let mut delayed = single.clone();
     delayed.tick.delay_ticks = 1;
@@ -127,6 +127,8 @@ fn variants() -> [(&'static str, Rig); 6] {
     });
     let mut late = single.clone();
     late.actuator.driver_lag_s = Some(0.004);
+    let mut late_and_delayed = late.clone();
+    late_and_delayed.tick.delay_ticks = 1;
     let late_and_integral = Rig { integral: integral.clone(), ..late.clone() };
     let mut old = rig("double-quanser-dbpen");
     old.chain_mut().unwrap().links[1].sensor_delay_s = 0.002;
@@ -136,6 +138,7 @@ fn variants() -> [(&'static str, Rig); 6] {
         ("delay and integral", both),
         ("old readings", old),
         ("lag", late),
+        ("lag and delay", late_and_delayed),
         ("lag and integral", late_and_integral),
         ("integral and friction", Rig { integral, friction, ..single }),
     ]

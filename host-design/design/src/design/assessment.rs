@@ -37,7 +37,7 @@ impl Certified {
             };
             let rounded = Feedback { k: single.k.map(|&gain| f64::from(gain)), ..exact.clone() };
             // A continuous gain feeds back no pending force.
-            let mut held = Matrix::zeros(1, continuous.k.cols() + usize::from(rig.tick.delay_ticks));
+            let mut held = Matrix::zeros(1, exact.k.cols());
             for j in 0..continuous.k.cols() {
                 held[(0, j)] = continuous.k[(0, j)];
             }

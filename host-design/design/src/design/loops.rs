@@ -1,7 +1,7 @@
 //! The closed loops of a design and their poles.
 
 use super::error::DesignError;
-use super::lag::{force_last, with_lag};
+use super::lag::{force_last, is_late_and_lags, shares, with_lag, with_pending};
 use super::synthesis::{Design, Feedback, with_integral};
 use super::zero_order_hold::zero_order_hold;
 use crate::numerics::{Complex, Matrix, Real, eigenvalues};
@@ -21,6 +21,15 @@ impl<R: Real> Design<R> {
         }
         let (a, b) = self.driven();
         zero_order_hold(&a, &b, period)
+    }
+
+    /// The sampled plant for which the laws are designed, before a delay alone: the same, or its pending force stands
+    /// for a delay and a lag.
+    pub(super) fn commanded(&self, rig: &Rig) -> (Matrix<R>, Matrix<R>) {
+        if is_late_and_lags(rig) {
+            return with_pending([&self.ad, &self.bd], shares(rig, rig.tick.period_s));
+        }
+        self.driven_sampled(&R::from_f64(rig.tick.period_s))
     }
 
     /// Poles of every closed loop.
@@ -55,7 +64,7 @@ impl<R: Real> Design<R> {
     /// integral action, then the pending force if there is a delay or a lag; `u = -K ζ`.
     pub fn sampled_loop(&self, rig: &Rig, law: &Feedback<R>) -> Matrix<R> {
         let period = R::from_f64(rig.tick.period_s);
-        let (a, b) = self.over_law(rig, law, self.driven_sampled(&period), [&period, &R::one()]);
+        let (a, b) = self.over_law(rig, law, self.commanded(rig), [&period, &R::one()]);
         if law.k.cols() == a.cols() {
             return &a - &(&b * &law.k);
         }
@@ -87,10 +96,10 @@ impl<R: Real> Design<R> {
         let n = law.n.as_ref()?;
         let (states, period) = (self.ad.rows(), R::from_f64(rig.tick.period_s));
         let mut input = Matrix::zeros(law.k.cols(), 1);
-        if rig.tick.delay_ticks == 1 {
+        if rig.tick.delay_ticks == 1 && self.lag_s == 0.0 {
             input[(law.k.cols() - 1, 0)] = n.clone();
         } else {
-            let (_, b) = self.over_law(rig, law, self.driven_sampled(&period), [&period, &R::one()]);
+            let (_, b) = self.over_law(rig, law, self.commanded(rig), [&period, &R::one()]);
             input = b.scaled(n);
         }
         if law.integral {

@@ -42,7 +42,7 @@ pub use governor::setpoint_step;
 pub(crate) use hold::Hold;
 pub use kalman::Kalman;
 pub(crate) use kalman::add_rounded_motion;
-pub(crate) use lag::{lag_s, shares, with_lag};
+pub(crate) use lag::{lag_s, shares, shares_of_lag, with_lag};
 pub use loops::{DesignPoles, Poles};
 pub use place::{Pole, dominant_pair, place};
 pub use riccati::{Cost, NoStabilisingSolution, Regulator, care, dare, is_stable, is_stable_sampled};

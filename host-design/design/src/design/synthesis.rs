@@ -4,7 +4,7 @@ use super::diagnosis::{why_no_lqr, why_no_placement};
 use super::error::{DesignError, Task};
 use super::hold::Hold;
 use super::kalman::{Kalman, kalman};
-use super::lag::{force_last, lag_s, widened, with_lag};
+use super::lag::{cost_with_pending, force_last, is_late_and_lags, lag_s, shares, widened, with_lag};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
 
@@ -120,17 +120,15 @@ impl<R: Real> Design<R> {
         let (ad, bd) = hold.sampled(&a, &b, &period);
         let lag_s = lag_s(rig);
         let further = usize::from(lag_s > 0.0);
-        let plant = with_lag(&a, &b, lag_s);
-        let (a_u, b_u) = hold.sampled(&plant.0, &plant.1, &period);
         let output = rig.output();
-        let late = rig.tick.delay_ticks == 1;
+        let late = rig.tick.delay_ticks == 1 && lag_s == 0.0;
+        let plant =
+            Self { continuous: Laws::none(), sampled: Laws::none(), kalman: None, a, b, ad, bd, lag_s };
+        let (a_u, b_u) = plant.commanded(rig);
 
         let mut sampled = Laws::none();
         if let Some(weights) = &rig.lqr {
-            let cost = match widened(lqr_cost(weights), further) {
-                of_a_tick if weights.cost_is_sum => of_a_tick,
-                over_time => hold.cost(&plant.0, &plant.1, &over_time, &period),
-            };
+            let cost = plant.cost_of_a_tick(rig, weights);
             let k = lqr(Task::SampledLqr, &a_u, &b_u, &cost, residuals)?;
             sampled.lqr = Some(sampled_feedback(k, [&a_u, &b_u], [&a_u, &b_u], output, late));
             if let Some(integral) = &rig.integral {
@@ -152,12 +150,29 @@ impl<R: Real> Design<R> {
             sampled.pole_placement = Some(sampled_feedback(k, [&a_u, &b_u], [&a_u, &b_u], output, late));
         }
         let kalman = rig.kalman.as_ref().map(|noise| {
-            let inputs = noise_inputs(rig, &b, &torque_inputs);
-            let (gains, residual) = kalman(&a, &ad, &inputs, noise, rig, &period)?;
+            let inputs = noise_inputs(rig, &plant.b, &torque_inputs);
+            let (gains, residual) = kalman(&plant.a, &plant.ad, &inputs, noise, rig, &period)?;
             residuals.push((OBSERVER.to_owned(), residual.to_f64()));
             Ok(gains)
         });
-        Ok(Self { continuous: Laws::none(), sampled, kalman: kalman.transpose()?, a, b, ad, bd, lag_s })
+        Ok(Self { sampled, kalman: kalman.transpose()?, ..plant })
+    }
+
+    /// The cost of a tick over the states of [`commanded`](Self::commanded).
+    fn cost_of_a_tick(&self, rig: &Rig, weights: &Lqr) -> Cost<R> {
+        let period = R::from_f64(rig.tick.period_s);
+        let of_a_tick = |(a, b): (Matrix<R>, Matrix<R>), cost: Cost<R>| match weights.cost_is_sum {
+            true => cost,
+            false => Hold::of(rig).cost(&a, &b, &cost, &period),
+        };
+        let cost = lqr_cost(weights);
+        if !is_late_and_lags(rig) {
+            return of_a_tick(self.driven(), widened(cost, usize::from(self.lag_s > 0.0)));
+        }
+        let of_command = if weights.cost_is_sum { cost.r.clone() } else { cost.r.scaled(&period) };
+        let of_force = Cost { r: Matrix::zeros(1, 1), ..cost };
+        let of_force = of_a_tick((self.a.clone(), self.b.clone()), of_force);
+        cost_with_pending(&of_force, &of_command, shares(rig, rig.tick.period_s)[0])
     }
 }
 

@@ -211,6 +211,8 @@ const ZERO_RAD: f64 = 0.03;
 const ECCENTRICITY_RAD: f64 = 0.002;
 /// That of the magnet of an absolute sensor, which no log is identified without (rad).
 const MAGNET_RAD: f64 = 0.01;
+/// That of a potentiometer, of which all is known is that it is linear to this share of its travel.
+const LINEARITY: f64 = 0.005;
 /// Prior deviation of a friction, as a multiple of its expected value.
 pub(super) const FRICTION: f64 = 10.0;
 
@@ -258,7 +260,9 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         ParameterKind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
         ParameterKind::EccentricSine(j) | ParameterKind::EccentricCosine(j) => {
             let deviation = match chain.links[j].encoder {
-                Some(LinkEncoder::Absolute { .. }) => MAGNET_RAD,
+                Some(LinkEncoder::Absolute { travel_rad, .. }) => {
+                    travel_rad.map_or(MAGNET_RAD, |travel_rad| LINEARITY * travel_rad)
+                }
                 _ if eccentricity => ECCENTRICITY_RAD,
                 _ => 0.0,
             };
@@ -281,5 +285,22 @@ mod tests {
         let given = ParameterKind::Presliding(0).of_file() * bend;
         assert!((given - 2e-3).abs() < 1e-15 && bend < 1.6e-3, "{given} {bend}");
         assert_eq!(ParameterKind::JointDry(0).of_file(), 1.0);
+    }
+
+    #[test]
+    fn a_potentiometer_is_taken_for_less_exact_than_a_magnetic_sensor_and_an_encoder_for_exact() {
+        let mut rig = Rig::from_path("../../rigs/single-absolute.toml".as_ref()).unwrap();
+        let mut off = |encoder| {
+            let Some(chain) = rig.chain_mut() else { panic!() };
+            chain.links[0].encoder = Some(encoder);
+            let kinds = Layout { links: 1 }.kinds();
+            let at = kinds.iter().position(|kind| *kind == ParameterKind::EccentricSine(0)).unwrap();
+            priors(&rig, rig.chain().unwrap(), false)[at].deviation
+        };
+        let mut absolute = |travel_rad| {
+            off(LinkEncoder::Absolute { bits: 12, travel_rad, zero_counts: 3100, noise_rad: 1e-3 })
+        };
+        assert_eq!([absolute(None), absolute(Some(6.0))], [0.01, 0.03]);
+        assert_eq!(off(LinkEncoder::CountsPerRev(4096.0)), 0.0);
     }
 }

@@ -15,7 +15,7 @@ use super::log::{DriveScale, Log};
 use super::model::Model;
 use super::parameters::Layout;
 use super::table::RecordingRows;
-use crate::design::shares;
+use crate::design::{lag_s, shares_of_lag};
 use crate::rig::{Motor, Rig};
 
 /// Longest time from one sample to the next (s), which is also the integration step.
@@ -47,7 +47,9 @@ pub(super) struct Record {
     /// Noise of each channel besides the rounding to steps, root mean square (m, rad).
     pub(super) noise: Vec<f64>,
     motor: Option<Motor>,
-    /// How the force follows its command: see [`shares`].
+    /// Whether the force begins a tick after its command.
+    is_late: bool,
+    /// How it follows from then on: see [`shares_of_lag`].
     shares: [f64; 2],
     /// Whether the cart cannot move; its channel is then 0.
     pub(super) is_clamped: bool,
@@ -75,7 +77,8 @@ impl Record {
             stride,
             dt_s: stride as f64 * period_s,
             motor: rig.actuator.motor.clone(),
-            shares: shares(rig, period_s),
+            is_late: rig.tick.delay_ticks == 1,
+            shares: shares_of_lag(lag_s(rig), period_s),
             is_clamped: false,
             is_moved: rig.actuator.acceleration.is_some(),
             noise: rig.sensors().iter().map(|sensor| sensor.noise).collect(),
@@ -241,9 +244,10 @@ impl Record {
             if left > 0.0 { [per_volt * left.copysign(value), -per_volt.copysign(value)] } else { [0.0; 2] }
         };
         let [pending, left] = self.shares;
-        let mut before = [0.0; 2];
+        let (mut before, mut previous) = ([0.0; 2], [0.0; 2]);
         let mean = |drive: &Option<f64>| {
-            let command = commanded(drive.unwrap_or_default());
+            let now = commanded(drive.unwrap_or_default());
+            let command = if self.is_late { std::mem::replace(&mut previous, now) } else { now };
             let mix = |share: f64| [0, 1].map(|i| share * before[i] + (1.0 - share) * command[i]);
             let mean = mix(pending);
             before = mix(left);

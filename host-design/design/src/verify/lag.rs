@@ -49,6 +49,6 @@ pub(super) fn limits(
 /// The loop whose force follows its command with this lag (s).
 fn loop_with(certified: &Certified, numbers: &Numbers<f64>, tick_s: f64, lag_s: f64) -> LoopModel<f64> {
     let (a, b): (Matrix<f64>, Matrix<f64>) = with_lag(&certified.double.a, &certified.double.b, lag_s);
-    let plant = PlantModel::delayed(&a, &b, tick_s, 0.0, &numbers.c);
+    let plant = PlantModel::delayed(&a, &b, tick_s, numbers.delay_ticks() as f64, &numbers.c);
     LoopModel::of(&plant, &ControllerModel::of(numbers))
 }

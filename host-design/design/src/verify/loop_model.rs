@@ -146,7 +146,7 @@ impl<R: Real> Numbers<R> {
 
     /// Whole ticks by which the force is late.
     pub(super) fn delay_ticks(&self) -> usize {
-        usize::from(self.pending[0] == R::one())
+        usize::from(self.pending[0] >= R::one())
     }
 }
 

@@ -97,6 +97,47 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     assert!((total - of_total(&found.estimates)).abs() < 1e-9);
 }
 
+/// Readings that are 4 ms old look like frictions that are negative.
+#[test]
+fn readings_that_are_old_are_known_if_the_file_states_their_age() {
+    let with = |delay_s: f64, reality: &str| {
+        let mut rig = rig(reality);
+        rig.chain_mut().unwrap().links.iter_mut().for_each(|link| link.sensor_delay_s = delay_s);
+        rig
+    };
+    let (truth, file) = (with(4e-3, REALITY), with(4e-3, ""));
+    let mut log = shake(&truth, 15.0, 3).unwrap();
+    let constants =
+        ChainParameters::<f64>::of(&real_chain(truth.chain().unwrap(), &truth.reality.parameters));
+    let dry = |j: usize| truth.reality.friction.joint_friction_n_m.of(j);
+    // Errors in deviations.
+    let errors = |found: &Identification| {
+        let error = |(kind, wanted): (ParameterKind, f64)| {
+            let estimate = found.estimate(kind).unwrap();
+            println!("{kind:?}: {} ± {}, {wanted}", estimate.new, estimate.deviation);
+            (estimate.new - wanted).abs() / estimate.deviation
+        };
+        [
+            (ParameterKind::TotalMass, constants.total_mass),
+            (ParameterKind::Length(0), constants.b[(0, 1)] / constants.a[1]),
+            (ParameterKind::JointViscous(0), 0.0024),
+            (ParameterKind::JointViscous(1), 0.0024),
+            (ParameterKind::JointDry(0), dry(0)),
+            (ParameterKind::JointDry(1), dry(1)),
+        ]
+        .map(error)
+    };
+    let found = run(&file, &log, &TRUSTED).unwrap();
+    assert_eq!(found.refusal, None, "{found:?}");
+    assert!(errors(&found).iter().all(|&error| error < 4.0), "{found:?}");
+    // Negative control: a file that does not state it.
+    let silent = rig("");
+    log.header.hash = silent.hash();
+    let found = run(&silent, &log, &TRUSTED).unwrap();
+    println!("{:?}", found.refusal);
+    assert!(found.refusal.is_some() || errors(&found).iter().any(|&error| error > 10.0), "{found:?}");
+}
+
 #[test]
 fn a_force_that_follows_late_is_known_if_the_file_states_its_lag() {
     let with = |lag_s: f64, reality: &str| {
@@ -205,14 +246,13 @@ fn the_excitation_keeps_the_model_within_its_rail() {
     }
 }
 
-/// The magnet of an absolute sensor is never exactly over it: 0.3° once per turn.
-#[test]
-fn an_absolute_sensor_whose_magnet_is_off_is_identified_with_its_noise_and_not_fitted_as_an_encoder() {
+/// The log of a machine whose absolute sensor is off by `off_rad` once per turn, and what is found in it.
+fn with_absolute(text: &str, off_rad: f64) -> (Rig, Log) {
     let name = Path::new("../../rigs/single-absolute.toml");
-    let text = std::fs::read_to_string(name).unwrap();
-    let file = Rig::from_toml(&text, name).unwrap();
-    let real =
-        "[reality]\neccentricity_rad = 0.0052\neccentricity_phase_rad = 0.7\nlink_length_percent = 4\n";
+    let file = Rig::from_toml(text, name).unwrap();
+    let real = format!(
+        "[reality]\neccentricity_rad = {off_rad}\neccentricity_phase_rad = 0.7\nlink_length_percent = 4\n"
+    );
     let truth = Rig::from_toml(&format!("{text}\n{real}"), name).unwrap();
     let log = shake(&truth, 20.0, 3).unwrap();
     let found = run(&file, &log, &TRUSTED).unwrap();
@@ -223,8 +263,8 @@ fn an_absolute_sensor_whose_magnet_is_off_is_identified_with_its_noise_and_not_f
         (ParameterKind::FirstMoment(0), constants.a[0]),
         (ParameterKind::SecondMoment(0), constants.b[(0, 0)]),
         (ParameterKind::TotalMass, constants.total_mass),
-        (ParameterKind::EccentricSine(0), 0.0052 * 0.7f64.cos()),
-        (ParameterKind::EccentricCosine(0), 0.0052 * 0.7f64.sin()),
+        (ParameterKind::EccentricSine(0), off_rad * 0.7f64.cos()),
+        (ParameterKind::EccentricCosine(0), off_rad * 0.7f64.sin()),
     ] {
         let estimate = found.estimate(kind).unwrap();
         println!("{kind:?}: {} ± {}, {wanted}", estimate.new, estimate.deviation);
@@ -234,6 +274,18 @@ fn an_absolute_sensor_whose_magnet_is_off_is_identified_with_its_noise_and_not_f
     // The sensor's own zero is not one of the link.
     let zero = found.estimate(ParameterKind::Zero(0)).unwrap();
     assert!(zero.new.abs() < 0.01, "{zero:?}");
+    (file, log)
+}
+
+/// The magnet of an absolute sensor is never exactly over it: 0.3° once per turn. A potentiometer is not linear: half a
+/// percent of its travel to either side.
+#[test]
+fn an_absolute_sensor_whose_magnet_is_off_or_that_is_not_linear_is_identified_and_not_fitted_as_an_encoder() {
+    let text = std::fs::read_to_string("../../rigs/single-absolute.toml").unwrap();
+    let (file, log) = with_absolute(&text, 0.0052);
+    let potentiometer = text.replace("sensor_bits = 14", "sensor_bits = 12\nsensor_travel_rad = 5.934");
+    let zero = text.lines().find(|line| line.starts_with("sensor_zero_counts")).unwrap();
+    with_absolute(&potentiometer.replace(zero, "sensor_zero_counts = 3100"), 0.03);
     // Negative control: as an encoder, which has no noise, it fits no machine.
     let mut encoder = file;
     encoder.chain_mut().unwrap().links[0].encoder =

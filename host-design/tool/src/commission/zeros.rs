@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::time::Duration;
 
 use upright_design::client::AnyTelemetry;
-use upright_design::rig::{LinkEncoder, RigText};
+use upright_design::rig::{LinkEncoder, Rig, RigText};
 
 use super::contacts;
 use super::guide::Guide;
@@ -88,7 +88,10 @@ pub fn measured_zeros(
             (apart * rad).abs()
         ));
     }
-    Ok(text.to_string())
+    let text = text.to_string();
+    // A potentiometer may hang where it does not read upright.
+    Rig::from_toml(&text, plan.file).map_err(bad)?;
+    Ok(text)
 }
 
 fn sensors(plan: CommissionPlan<'_>) -> Vec<AbsoluteLink> {

@@ -128,6 +128,42 @@ fn the_zeros_of_absolute_sensors_are_measured_and_nothing_else_of_the_file_chang
     assert!(status(&output) == 2 && stderr(&output).contains("no link has an absolute sensor"));
 }
 
+/// A potentiometer, which has no reading beyond its ends, of a machine that hangs where `real` is read.
+fn measured_potentiometer(real: u32) -> (String, Result<String, String>) {
+    let text = std::fs::read_to_string(path_of("single-absolute")).unwrap().replace(
+        "sensor_bits = 14\nsensor_zero_counts = 9021",
+        "sensor_bits = 12\nsensor_travel_rad = 5.934\nsensor_zero_counts = 3100",
+    );
+    let mut rig = Rig::from_toml(&text, Path::new("rig.toml")).unwrap();
+    let table = crate::published::table(&rig);
+    let of_file = rig.clone();
+    if let Some(LinkEncoder::Absolute { zero_counts, .. }) = &mut rig.chain_mut().unwrap().links[0].encoder {
+        *zero_counts = real;
+    }
+    let mut journal = Journal::new(CommissionRecord::new(&rig, "this computer"), None, Box::new(|_| ()));
+    let result = with_firmware(&table, |target| {
+        let mut machine = Simulated::new(&rig, &table, None, target, 2).unwrap();
+        measured_zeros(plan(&of_file, &table, &text), &mut machine, &mut journal)
+    });
+    (text, result.unwrap().map_err(|error| error.to_string()))
+}
+
+#[test]
+fn the_zero_of_a_potentiometer_is_measured_unless_it_would_not_read_upright() {
+    for real in [3100, 2900, 3300] {
+        let (text, found) = measured_potentiometer(real);
+        let found = found.unwrap();
+        let zero = found.lines().find_map(|line| line.strip_prefix("sensor_zero_counts = ")).unwrap();
+        assert!(zero.parse::<u32>().unwrap().abs_diff(real) <= 2, "{real}: {zero}");
+        assert_eq!(found, text.replace("3100", zero));
+    }
+    // Negative control: the dead band is where the link is upright.
+    let (_, found) = measured_potentiometer(2048);
+    println!("{found:?}");
+    let refused = found.unwrap_err();
+    assert!(refused.contains("turn the potentiometer"), "{refused}");
+}
+
 /// A machine whose links never hang still.
 struct Restless<'a>(Simulated<'a>);
 

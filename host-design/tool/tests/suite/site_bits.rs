@@ -18,7 +18,7 @@ use crate::twin_page::comes_within;
 /// Rigs that the firmware does not run on the host: a model with ten states, of which only the table is compared.
 const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
 
-/// All rigs of the project: name, text, stored motions.
+/// All rigs of the project, and one whose force and readings are late: name, text, stored motions.
 fn rigs() -> Vec<(String, String, Option<String>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -26,10 +26,19 @@ fn rigs() -> Vec<(String, String, Option<String>)> {
     files.sort();
     let read = |file: &Path| std::fs::read_to_string(file).ok();
     let name = |file: &Path| file.file_stem().unwrap().to_string_lossy().into_owned();
-    files
+    let published = files
         .iter()
-        .map(|file| (name(file), read(file).unwrap(), read(&file.with_extension("swing-up.json"))))
-        .collect()
+        .map(|file| (name(file), read(file).unwrap(), read(&file.with_extension("swing-up.json"))));
+    published.chain([("late".to_owned(), late_rig(), None)]).collect()
+}
+
+/// The text of a rig whose force begins a tick late and lags, and whose sensor is slow.
+pub(crate) fn late_rig() -> String {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs/single-quanser-ip02.toml");
+    let text = std::fs::read_to_string(file).unwrap();
+    text.replace("delay_ticks = 0", "delay_ticks = 1")
+        .replacen("[actuator]\n", "[actuator]\ndriver_lag_s = 0.004\n", 1)
+        .replacen("[[link]]\n", "[[link]]\nsensor_delay_s = 0.002\n", 1)
 }
 
 /// Whether the module is wanted here; says so if not.

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use upright_page::twin::InPage;
 
 use crate::report_devtools::Browser;
-use crate::site_bits::{in_node, is_wanted};
+use crate::site_bits::{in_node, is_wanted, late_rig};
 use crate::site_page::{opened, root, type_in, until as until_designed};
 use crate::twin_page::{
     FASTEST, MACHINE, STATE, catch_and_calibrate, click, let_pass, pull, set_speed, until, until_done,
@@ -21,7 +21,11 @@ fn read(file: &str) -> String {
 
 /// What a person does: pulls the raised rig towards `x`, lowers it, raises it, and breaks an encoder.
 fn script(x: f64) -> Vec<Value> {
-    let (toml, motions) = (read("single-quanser-ip02.toml"), read("single-quanser-ip02.swing-up.json"));
+    let motions = json!(read("single-quanser-ip02.swing-up.json"));
+    script_of(&read("single-quanser-ip02.toml"), &motions, x)
+}
+
+fn script_of(toml: &str, motions: &Value, x: f64) -> Vec<Value> {
     let start =
         json!({ "twin": "start", "toml": toml, "motions": motions, "upright": true, "since_1970_s": 1.7e9 });
     let run = |asked: &[Value], pictures: usize| -> Vec<Value> {
@@ -81,6 +85,21 @@ fn a_rig_balanced_in_webassembly_has_the_telemetry_and_motion_of_this_computer_b
     let other = in_node(&script(0.02f64.next_up()));
     assert_eq!(other[0], there[0]);
     assert_ne!(other[1..], there[1..]);
+}
+
+#[test]
+fn a_late_force_and_old_readings_are_made_up_for_in_webassembly_with_the_bits_of_this_computer() {
+    if !is_wanted("a late rig in WebAssembly") {
+        return;
+    }
+    let script = |toml: &str| script_of(toml, &Value::Null, 0.02);
+    let asked = script(&late_rig());
+    let (here, there) = (here(&asked), in_node(&asked));
+    assert_eq!(history(&here).0, ["Balancing", "Fault"]);
+    assert_eq!(here, there);
+    // Negative control: the lag of the table is another one in the last bit.
+    let other = in_node(&script(&late_rig().replace("0.004", "0.004000000000000001")));
+    assert!(there.last() != other.last() && other.iter().all(|answer| answer["failed"].is_null()));
 }
 
 /// Switches the designed rig on: raised, or hanging.

@@ -223,12 +223,6 @@ pub(crate) fn actuator(node: &Node<'_>, tick: &Tick) -> Result<Actuator, RigErro
     }
     let force_limit_n = table.value("force_limit_n")?;
     let driver_lag_s = table.value("driver_lag_s")?;
-    if let (Some(node), 1) = (table.get("driver_lag_s"), tick.delay_ticks) {
-        return Err(node.out_of_range(
-            "only with delay_ticks = 0",
-            "leave delay_ticks in [tick] out, and add a tick to driver_lag_s: a delay beside a lag is made up for as lag",
-        ));
-    }
     let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());
     let motor = described.then(|| motor(&table)).transpose()?;
     Ok(Actuator { force_limit_n, driver_lag_s, motor, acceleration: None })

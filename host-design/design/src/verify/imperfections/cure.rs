@@ -62,7 +62,7 @@ impl<'a> Cures<'a> {
     /// `[actuator]` with this lag of the driver (s), for which the law is designed; none if one is stated already, or
     /// where none can be.
     fn stating(&self, lag_s: f64) -> Option<(String, TableValues)> {
-        let is_free = self.rig.actuator.driver_lag_s.is_none() && self.rig.tick.delay_ticks == 0;
+        let is_free = self.rig.actuator.driver_lag_s.is_none();
         if !is_free || !self.rig.actuator.input().is_force() {
             return None;
         }
