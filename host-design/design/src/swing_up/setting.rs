@@ -19,9 +19,10 @@ use crate::verify::Disturbance;
 /// than at rest.
 const JOINT_NOISE: f64 = 100.0;
 const INPUT_NOISE: f64 = 10.0;
-/// That of the joints of a long chain on a stepper: its loop is so fast that a faster filter takes the spring of the
-/// motor for motion of the links.
-const JOINT_NOISE_ON_STEPPER: f64 = 3.0;
+/// That of the joints of a long chain on a stepper, and the factor on its input's weight along a motion: its loop is so
+/// fast that a faster filter takes the spring of the motor for motion of the links, and faster feedback excites it.
+const JOINT_NOISE_ON_STEPPER: f64 = 20.0;
+const INPUT_WEIGHT_ON_STEPPER: f64 = 8.0;
 /// Least number of links of such a chain.
 const LONG_ON_STEPPER: usize = 3;
 /// Time after which the filter at rest has settled (s).
@@ -41,6 +42,7 @@ pub(super) struct Setting<'a> {
     /// Travel per count of each sensor (m, rad).
     pub(super) steps: Vec<f64>,
     pub(super) weights: Matrix<f64>,
+    /// Weight of the input along a motion.
     pub(super) input_weight: f64,
     rests: BTreeMap<Equilibrium, AtRest>,
 }
@@ -118,7 +120,7 @@ impl<'a> Setting<'a> {
             noise,
             steps,
             weights,
-            input_weight,
+            input_weight: if is_fast(chain) { INPUT_WEIGHT_ON_STEPPER } else { 1.0 } * input_weight,
             rests,
             dynamics,
         })
@@ -135,6 +137,11 @@ impl<'a> Setting<'a> {
     }
 }
 
+/// Whether the loop is so fast that a motor's spring disturbs it.
+fn is_fast(chain: &Chain) -> bool {
+    !chain.input.is_force() && chain.links.len() >= LONG_ON_STEPPER
+}
+
 /// The noise that the filter expects in motion; `sensors` are the states that are measured, and the variances of their
 /// rounding errors.
 fn noise(chain: &Chain, kalman: &KalmanNoise, rules: &SwingUpRules, sensors: Vec<(usize, f64)>) -> Noise {
@@ -143,8 +150,7 @@ fn noise(chain: &Chain, kalman: &KalmanNoise, rules: &SwingUpRules, sensors: Vec
     // A drive that imposes the cart's motion overcomes its friction.
     let of_cart = if chain.input.is_force() { chain.cart.friction_n_s_per_m } else { 0.0 };
     let frictions = [of_cart].into_iter().chain(of_links);
-    let is_slow = chain.input.is_force() || chain.links.len() < LONG_ON_STEPPER;
-    let more = if is_slow { JOINT_NOISE } else { JOINT_NOISE_ON_STEPPER };
+    let more = if is_fast(chain) { JOINT_NOISE_ON_STEPPER } else { JOINT_NOISE };
     let joints = kalman.joint_noise.iter().map(|intensity| more * intensity);
     Noise {
         friction_errors: frictions.map(|friction| wrong * friction).collect(),
