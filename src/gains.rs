@@ -176,7 +176,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     },
     // Absolute sensors.
     absolute: AbsoluteZeros {
-        // Reading of each absolute sensor while the links hang at rest; -1 for a sensor that only counts (counts).
+        // Reading of each absolute sensor while the links hang at rest; of the cart's, which has no zero, a turn; -1
+        // for a sensor that only counts (counts).
         zero_counts: [-1, -1, -1, -1, -1],
         // Largest motion of each sensor within [`Limits::still_ticks`] that is still: what noise or the edge of a step
         // show (counts).

@@ -1,4 +1,4 @@
-//! Absolute sensors of the joints: their zeros, and how far a link may move that is still.
+//! Absolute sensors: their zeros, and how far a link or the cart may move that is still.
 
 use crate::table::limits::Limits;
 use crate::table::part::part;
@@ -7,7 +7,8 @@ part! {
     /// The absolute sensors among `NY` sensors.
     #[derive(Copy)]
     pub struct AbsoluteZeros<NY to MY;> {
-        /// Reading of each absolute sensor while the links hang at rest; -1 for a sensor that only counts (counts).
+        /// Reading of each absolute sensor while the links hang at rest; of the cart's, which has no zero, a turn; -1
+        /// for a sensor that only counts (counts).
         pub zero_counts: [i32; NY],
         /// Largest motion of each sensor within [`Limits::still_ticks`] that is still: what noise or the edge of a step
         /// show (counts).
@@ -26,15 +27,21 @@ impl<const NY: usize> AbsoluteZeros<NY> {
         sensor < NY && self.zero_counts[sensor] >= 0
     }
 
+    /// Counts in a turn of an absolute sensor.
+    pub const fn turn_counts(&self, limits: &Limits<NY>, sensor: usize) -> u32 {
+        let turns = if sensor == 0 { &self.zero_counts } else { &limits.turn_counts };
+        turns[sensor].unsigned_abs()
+    }
+
     /// Whether a sensor is a potentiometer, which does not read a whole turn: other absolute sensors have a power of
     /// two of counts in a turn.
     pub const fn is_potentiometer(&self, limits: &Limits<NY>, sensor: usize) -> bool {
-        self.is_absolute(sensor) && !limits.turn_counts[sensor].unsigned_abs().is_power_of_two()
+        self.is_absolute(sensor) && !self.turn_counts(limits, sensor).is_power_of_two()
     }
 
-    /// `home`, the positions of the sensors where the links hang, with those of absolute sensors, which read `raw`, by
-    /// their own zeros; none if such a sensor is off by more than half of [`Limits::sign_counts`], so that its link
-    /// does not hang or its zero is another one.
+    /// `home`, the positions of the sensors where the links hang, with those of links' absolute sensors, which read
+    /// `raw`, by their own zeros. None if such a sensor is off by more than half of [`Limits::sign_counts`]: its link
+    /// does not hang, or its zero is another one.
     pub fn positions(&self, home: &[i32; NY], raw: &[u32; NY], limits: &Limits<NY>) -> Option<[i32; NY]> {
         let mut positions = *home;
         let of_limits = limits.rest_counts.iter().zip(&limits.turn_counts).zip(&limits.sign_counts);
@@ -49,14 +56,15 @@ impl<const NY: usize> AbsoluteZeros<NY> {
     }
 }
 
-/// The position of an absolute sensor with this `reading` that is nearest to `home`; none if it is further away than
-/// half of `enough` (counts).
+/// The position of a link's absolute sensor with this `reading` that is nearest to `home`; none if it is further away
+/// than half of `enough` (counts). The cart has no `turn`, and is at `home`.
 // One copy for all sensors: it is not called in a tick.
 #[cold]
 #[inline(never)]
 fn nearest(reading: i32, home: i32, turn: i32, enough: i32) -> Option<i32> {
-    let (half, away) = (turn / 2, reading.wrapping_sub(home));
-    let away = if turn > 0 { away.wrapping_add(half).rem_euclid(turn) - half } else { away };
+    let turn = turn.max(1);
+    let half = turn / 2;
+    let away = reading.wrapping_sub(home).wrapping_add(half).rem_euclid(turn) - half;
     (away.unsigned_abs() <= enough.unsigned_abs() / 2).then_some(home.wrapping_add(away))
 }
 

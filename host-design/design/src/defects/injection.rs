@@ -65,7 +65,7 @@ struct AbsoluteReading {
 impl AbsoluteReading {
     /// That of this sensor, whose counter is `counter`.
     fn of(table: &TableValues, sensor: usize, counter: u32) -> Self {
-        let bits = table.limits.turn_counts[sensor].max(1).ilog2();
+        let bits = table.absolute.turn_counts(&table.limits, sensor).max(1).ilog2();
         let mut board = AbsoluteSensor::new(bits);
         let at_zero = counter.wrapping_sub(board.count(counter & ((1 << bits) - 1)));
         let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);

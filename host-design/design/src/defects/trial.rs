@@ -74,8 +74,10 @@ impl Defect {
         if self == Self::EncoderWireOpen {
             return sensor >= first_encoder(table) && !table.absolute.is_absolute(sensor);
         }
+        // Simulated pins have no room for a mark beside the cart's counter of 32 bits.
+        let is_not_shown = sensor == 0 && self == Self::SampleInvalid;
         let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
-        table.absolute.is_absolute(sensor) && !(self.is_of_frames() && is_potentiometer)
+        table.absolute.is_absolute(sensor) && !is_not_shown && !(self.is_of_frames() && is_potentiometer)
     }
 }
 

@@ -10,6 +10,7 @@ use super::sections::{
 };
 use super::value::Keys;
 use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
+use crate::number::significant;
 
 /// Checks a whole rig file.
 pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
@@ -54,6 +55,7 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     if rig.kalman.is_some() {
         position_is_measured(&root, &rig.plant)?;
     }
+    turns_are_counted(&root, &rig)?;
     Ok(rig)
 }
 
@@ -77,6 +79,23 @@ fn name(root: &Table<'_>) -> Result<String, RigError> {
         );
     }
     Ok(name.to_owned())
+}
+
+/// Between two readings, an absolute sensor of the cart must turn by less than half a turn.
+fn turns_are_counted(root: &Table<'_>, rig: &Rig) -> Result<(), RigError> {
+    let cart = rig.chain().map(|chain| &chain.cart);
+    let Some((bits, step_m)) = cart.and_then(|cart| cart.sensor_bits.zip(cart.encoder_step_m)) else {
+        return Ok(());
+    };
+    let in_a_tick_m = rig.limits.speed_m_per_s.unwrap_or_default() * rig.tick.period_s;
+    let least = 2.0 * in_a_tick_m / bits.exp2();
+    if step_m > least {
+        return Ok(());
+    }
+    let accepts = format!("a number > {}: less than half a turn in a tick", significant(least, 3));
+    let remedy = "use a larger pulley, or lower speed_m_per_s of [limits] or period_s of [tick]";
+    let cart = root.need("cart", "[cart]")?.table(&chain::CART)?;
+    Err(cart.required("encoder_step_m")?.out_of_range(&accepts, remedy))
 }
 
 /// An observer needs the resolution of its sensors, and no observer can find the cart's position from the angles

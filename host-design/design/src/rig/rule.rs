@@ -91,6 +91,8 @@ impl Rule {
         accepts: "a number from 0 to 0.005 (rad)",
         admits: |x| x.iter().all(|&x| (0.0..=0.005).contains(&x)),
     };
+    /// As [`NOISE`](Self::NOISE), of a sensor of the cart.
+    pub(super) const NOISE_M: Rule = Self::NOISE.worded("a number from 0 to 0.005 (m)");
     /// A delay of no tick or of one tick.
     pub(super) const ZERO_OR_ONE: Rule =
         Rule { accepts: "0 or 1", admits: |x| x.iter().all(|&x| x == 0.0 || x == 1.0) };

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use upright::control::encoder::{AbsoluteSensor, is_at_end};
 
 use super::description::Rig;
-use super::sections::chain::PlantDescription;
+use super::sections::chain::{Cart, PlantDescription};
 use super::sections::link::LinkEncoder;
 use crate::numerics::{Matrix, Real};
 
@@ -16,19 +16,19 @@ pub struct Sensor {
     pub state: usize,
     /// Noise besides rounding, root mean square (unit of the state).
     pub noise: f64,
-    /// How it reads, if it is an absolute sensor of an angle.
+    /// How it reads, if it is an absolute sensor.
     pub absolute: Option<AbsoluteRange>,
     /// Age of its reading at the tick (s).
     pub delay_s: f64,
     resolution: Resolution,
 }
 
-/// How an absolute sensor of an angle reads.
+/// How an absolute sensor reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AbsoluteRange {
     /// Bits that are used.
     pub bits: u32,
-    /// Reading while the links hang (counts).
+    /// Reading while the links hang (counts). The cart's is any reading: homing gives the cart its position.
     pub zero: u32,
     /// Counts in a turn. A potentiometer reads only the first 2^bits of them.
     pub turn: u32,
@@ -76,6 +76,14 @@ impl Sensor {
     /// A sensor of this state that counts steps of this size.
     const fn of_step(state: usize, step: f64) -> Self {
         Self { state, noise: 0.0, absolute: None, delay_s: 0.0, resolution: Resolution::Step(step) }
+    }
+
+    fn of_cart(cart: &Cart, step_m: f64) -> Self {
+        let Some(bits) = cart.sensor_bits else { return Self::of_step(0, step_m) };
+        let used = bits.min(f64::from(AbsoluteSensor::BITS));
+        let range = AbsoluteRange { bits: used as u32, zero: 0, turn: 1 << used as u32, rest: 0 };
+        let sensor = Self::of_step(0, step_m * (bits - used).exp2());
+        Self { noise: cart.sensor_noise_m, absolute: Some(range), ..sensor }
     }
 
     fn of_link(state: usize, encoder: LinkEncoder) -> Self {
@@ -135,7 +143,8 @@ impl Rig {
             PlantDescription::Chain(chain) => {
                 // A drive that imposes the motion counts its own steps.
                 let step_m = self.actuator.acceleration.as_ref().map(|drive| drive.step_m);
-                let cart = step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_step(0, step));
+                let cart =
+                    step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_cart(&chain.cart, step));
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {
                     let sensor = Sensor::of_link(2 + 2 * link, description.encoder?);
                     Some(Sensor { delay_s: description.sensor_delay_s, ..sensor })

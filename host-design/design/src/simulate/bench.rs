@@ -99,7 +99,7 @@ impl Bench {
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
-            sensors: SimulatedSensor::all(rig),
+            sensors: SimulatedSensor::all(rig, scenario.counter_start),
             counter_start: scenario.counter_start,
             random: Pcg64::seed_from_u64(scenario.seed),
             force_noise_n: noise(scenario.force_noise_n)?,

@@ -23,14 +23,17 @@ struct Absolute {
 }
 
 impl SimulatedSensor {
-    /// The sensors of a rig.
-    pub(super) fn all(rig: &Rig) -> Vec<Self> {
-        rig.sensors().iter().map(Self::of).collect()
+    /// The sensors of a rig. An absolute sensor of the cart reads `counter_start` at position 0.
+    pub(super) fn all(rig: &Rig, counter_start: u32) -> Vec<Self> {
+        rig.sensors().iter().map(|sensor| Self::of(sensor, counter_start)).collect()
     }
 
-    fn of(sensor: &Sensor) -> Self {
+    fn of(sensor: &Sensor, counter_start: u32) -> Self {
         let step: f64 = sensor.step();
-        let absolute = sensor.absolute.map(|range| {
+        let absolute = sensor.absolute.map(|mut range| {
+            if sensor.state == 0 {
+                range.zero = counter_start % range.turn;
+            }
             let mut board = AbsoluteSensor::new(range.bits);
             Absolute { range, at_zero: board.count(range.reading(0)), board }
         });

@@ -82,7 +82,7 @@ pub(super) fn absolute_zeros(rig: &Rig, steps: &[f64]) -> AbsoluteZeros<MAX_SENS
     let mut zeros = AbsoluteZeros::none();
     for (sensor, (description, &step)) in rig.sensors().iter().zip(steps).enumerate() {
         if let Some(range) = description.absolute {
-            zeros.zero_counts[sensor] = range.zero as i32;
+            zeros.zero_counts[sensor] = if sensor == 0 { range.turn } else { range.zero } as i32;
             zeros.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
         }
     }

@@ -3,14 +3,13 @@
 use core::f64::consts::TAU;
 
 use serde::Serialize;
-use upright::control::encoder::AbsoluteSensor;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
 use super::trial::{Disturbance, Horizon, disturbed, edge, trial};
 use crate::design::{DesignError, Uncertified, design};
 use crate::parallel;
-use crate::rig::{LinkEncoder, PlantDescription, Rig};
+use crate::rig::{LinkEncoder, PlantDescription, Rig, Sensor};
 use crate::simulate::SimulationError;
 use crate::table::TableValues;
 
@@ -64,15 +63,18 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     let mut coarse = rig.clone();
     match &mut coarse.plant {
         PlantDescription::Chain(chain) => {
-            chain.cart.encoder_step_m = chain.cart.encoder_step_m.map(|step| step * factor);
-            for link in &mut chain.links {
+            match chain.cart.sensor_bits {
+                Some(_) => chain.cart.sensor_noise_m = more_noise(rig, 0, factor),
+                None => chain.cart.encoder_step_m = chain.cart.encoder_step_m.map(|step| step * factor),
+            }
+            for (number, link) in (1..).zip(&mut chain.links) {
                 link.encoder = link.encoder.map(|encoder| match encoder {
                     LinkEncoder::StepRad(step) => LinkEncoder::StepRad(step * factor),
                     LinkEncoder::CountsPerRev(counts) => {
                         LinkEncoder::CountsPerRev((counts / factor).round().max(2.0))
                     }
-                    LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad } => {
-                        let noise_rad = more_noise(bits, travel_rad, noise_rad, factor);
+                    LinkEncoder::Absolute { bits, travel_rad, zero_counts, .. } => {
+                        let noise_rad = more_noise(rig, 2 * number, factor);
                         LinkEncoder::Absolute { bits, travel_rad, zero_counts, noise_rad }
                     }
                 });
@@ -85,11 +87,13 @@ pub fn coarser(rig: &Rig, factor: f64) -> Rig {
     coarse
 }
 
-/// Noise (rad) with which the whole error of an absolute sensor, with its rounding, is `factor` times as large.
-fn more_noise(bits: u8, travel_rad: Option<f64>, noise_rad: f64, factor: f64) -> f64 {
-    let rounding =
-        (travel_rad.unwrap_or(TAU) / f64::from(bits.min(AbsoluteSensor::BITS as u8)).exp2()).powi(2) / 12.0;
-    (factor * factor * (noise_rad * noise_rad + rounding) - rounding).max(0.0).sqrt()
+/// Noise (m or rad) with which the whole error of the absolute sensor of this state, with its rounding, is `factor`
+/// times as large.
+fn more_noise(rig: &Rig, state: usize, factor: f64) -> f64 {
+    let noise = |sensor: &Sensor| {
+        ((factor * factor - 1.0) * sensor.variance() + sensor.noise.powi(2)).max(0.0).sqrt()
+    };
+    rig.sensors().iter().find(|sensor| sensor.state == state).map_or(0.0, noise)
 }
 
 /// `own` with the observer for `rig`, which differs from the rig of `own` in its encoders alone. The observer is not

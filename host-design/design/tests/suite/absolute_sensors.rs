@@ -2,6 +2,7 @@
 
 use core::f64::consts::PI;
 
+use upright::control::encoder::AbsoluteSensor;
 use upright::protocol::message::{Answer, Request};
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::fault::{Cause, Fault};
@@ -13,9 +14,9 @@ use upright_design::harness::{Harness, record, with_firmware};
 use upright_design::numerics::spectral_radius;
 use upright_design::reality::RealEncoders;
 use upright_design::rig::{LinkEncoder, PerJoint, Rig};
-use upright_design::simulate::Scenario;
+use upright_design::simulate::{Bench, Scenario};
 use upright_design::swing_up::Stored;
-use upright_design::verify::{LoopModel, linear};
+use upright_design::verify::{LoopModel, at_rest_disturbed, linear};
 
 use crate::published::{certified, rig, table};
 use crate::supervised::{ALL_RIGS, ask, balancing, cause, rejected, tick};
@@ -43,6 +44,54 @@ fn the_firmware_raises_and_balances_every_rig_with_absolute_sensors() {
         let run = run.unwrap().unwrap();
         assert!(run.fault.is_none() && run.summary.survives(), "{name}: {:?} {}", run.fault, run.summary);
     }
+}
+
+/// The rig with an absolute sensor on the pulley of its cart, too.
+fn with_cart(mut rig: Rig, bits: f64, noise_m: f64) -> Rig {
+    let cart = &mut rig.chain_mut().unwrap().cart;
+    (cart.sensor_bits, cart.sensor_noise_m) = (Some(bits), noise_m);
+    rig
+}
+
+#[test]
+fn a_cart_with_an_absolute_sensor_is_where_its_turns_say() {
+    let rig = with_cart(rig("single-quanser-ip02"), 12.0, 0.0);
+    let (step, turn) = (rig.sensors()[0].step::<f64>(), 1 << 12);
+    let scenario = Scenario { counter_start: 3_000_000_123, ..Scenario::at_rest(&rig, Law::Lqr) };
+    let mut bench = Bench::new(&rig, &scenario).unwrap();
+    let (mut zero, mut counters) = ([0; 2], [0; 2]);
+    bench.read_counters_at_zero(&mut zero);
+    // What a board makes of the readings that takes them for those of 13 bits.
+    let mut other = AbsoluteSensor::new(13);
+    let (mut most, mut wrong) = (0.0_f64, 0);
+    for tick in 0..2000 {
+        let x = 0.35 * (0.01 * f64::from(tick)).sin();
+        bench.hold(&[x, 0.0, 0.0, 0.0]);
+        bench.read_counters(&mut counters);
+        let moved = counters[0].wrapping_sub(zero[0]) as i32;
+        assert!((f64::from(moved) - x / step).abs() <= 0.5, "{x}: {moved}");
+        most = most.max(f64::from(moved.abs()) / f64::from(turn));
+        let seen = other.count(counters[0] % turn) as i32;
+        wrong = wrong.max((seen - moved).abs());
+    }
+    assert!(most > 3.0 && wrong > turn as i32, "{most} {wrong}");
+
+    // The same bits as with an encoder, whose step it has.
+    let run = |rig: &Rig| {
+        let (values, scenario) = (table(rig), at_rest_disturbed(rig, Law::Lqr, 1));
+        let run =
+            with_firmware(&values, |firmware| record(rig, &values, &scenario, firmware)).unwrap().unwrap();
+        assert!(run.fault.is_none() && run.summary.survives(), "{:?}", run.fault);
+        format!("{:?}", run.summary)
+    };
+    let encoder = crate::published::rig("single-quanser-ip02");
+    assert_eq!(run(&rig), run(&encoder));
+    // With noise, the observer trusts it less, and its bits beyond 16 are not used.
+    let noisy = with_cart(encoder.clone(), 18.0, 2e-4);
+    let gain = |rig: &Rig| certified(rig).double.kalman.as_ref().unwrap().l_filter[(0, 0)];
+    assert!(gain(&noisy) < 0.7 * gain(&encoder) && run(&noisy) != run(&encoder));
+    assert_eq!(noisy.sensors()[0].step::<f64>(), 4.0 * step);
+    assert_eq!(table(&noisy).absolute.zero_counts[..2], [1 << 16, -1]);
 }
 
 /// What the firmware answers to homing while the single pendulum hangs with its sensor this far from its zero (rad),

@@ -240,6 +240,7 @@ fn keys_of_a_force_are_refused_with_what_to_do() {
     refused("step_m = 5e-5\n", "", &["actuator.step_m", "missing", "travel of the cart per pulse"]);
     refused("= 20000", "= 20", &["actuator.step_rate_limit_hz", ">= 200 (Hz)"]);
     refused("[cart]\n", "[cart]\nencoder_step_m = 1e-5\n", &["cart.encoder_step_m", "step_m of [actuator]"]);
+    refused("[cart]\n", "[cart]\nsensor_bits = 14\n", &["cart.sensor_bits", "step_m of [actuator]"]);
     refused("acceleration_weight", "force_weight", &["lqr.force_weight", "give acceleration_weight instead"]);
     refused("acceleration_noise_m2_per_s3", "force_noise_n2_s", &["kalman.force_noise_n2_s"]);
     refused("period_s = 0.01", "period_s = 0.01\ndelay_ticks = 1", &["actuator.kind", "delay_ticks"]);

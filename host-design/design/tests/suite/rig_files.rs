@@ -75,8 +75,14 @@ fn what_is_left_out_gets_its_documented_default() {
         friction_n_m_s_per_rad: 0.0,
         encoder: None,
     };
-    let cart =
-        Cart { mass_kg: Some(1.0), friction_n_s_per_m: 0.0, travel_m: [-2.0, 2.0], encoder_step_m: None };
+    let cart = Cart {
+        mass_kg: Some(1.0),
+        friction_n_s_per_m: 0.0,
+        travel_m: [-2.0, 2.0],
+        encoder_step_m: None,
+        sensor_bits: None,
+        sensor_noise_m: 0.0,
+    };
     let expected = Rig {
         verify: Default::default(),
         reality: Default::default(),

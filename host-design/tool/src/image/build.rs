@@ -107,13 +107,15 @@ fn reads_all(board: BoardName, table: &TableValues) -> Result<(), BuildError> {
     if !board.reads_angles() {
         return counts_all(table);
     }
-    for link in (1..table.sensors()).filter(|&link| table.absolute.is_absolute(link)) {
-        let turn = table.limits.turn_counts[link];
-        match table.absolute.is_potentiometer(&table.limits, link) {
-            true if link != 1 || turn.ilog2() != BoardName::WIPER_BITS => {
-                return Err(BuildError::Potentiometer { board, link });
+    for sensor in (0..table.sensors()).filter(|&sensor| table.absolute.is_absolute(sensor)) {
+        let turn = table.absolute.turn_counts(&table.limits, sensor);
+        match table.absolute.is_potentiometer(&table.limits, sensor) {
+            true if sensor != 1 || turn.ilog2() != BoardName::WIPER_BITS => {
+                return Err(BuildError::Potentiometer { board, link: sensor });
             }
-            false if turn != 1 << BoardName::ANGLE_BITS => return Err(BuildError::AngleBits { board, link }),
+            false if turn != 1 << BoardName::ANGLE_BITS => {
+                return Err(BuildError::AngleBits { board, sensor });
+            }
             _ => {}
         }
     }
@@ -122,8 +124,8 @@ fn reads_all(board: BoardName, table: &TableValues) -> Result<(), BuildError> {
 
 /// Checks that the table's rig has encoders alone.
 pub(super) fn counts_all(table: &TableValues) -> Result<(), BuildError> {
-    let link = (0..table.sensors()).find(|&sensor| table.absolute.is_absolute(sensor));
-    link.map_or(Ok(()), |link| Err(BuildError::AbsoluteSensor { link }))
+    let absolute = (0..table.sensors()).find(|&sensor| table.absolute.is_absolute(sensor));
+    absolute.map_or(Ok(()), |sensor| Err(BuildError::AbsoluteSensor { sensor }))
 }
 
 /// Waits until no other process compiles an image, and keeps others waiting until the file is dropped. The compiler

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use upright_design::conversation::words::joint;
 use upright_design::table::WriteError;
 
 use super::board::BoardName;
@@ -33,17 +34,17 @@ pub enum BuildError {
         /// Number of the rig's sensors.
         needed: usize,
     },
-    /// A link has an absolute sensor of another kind than the board reads.
+    /// An absolute sensor of another kind than the board reads.
     #[error(
-        "{board} reads absolute sensors of {} bits, AS5047D or AS5047P, and link {link} has another sensor_bits: use \
+        "{board} reads absolute sensors of {} bits, AS5047D or AS5047P, and the {} has another sensor_bits: use \
          such a sensor, or write a board that reads it (docs/own-board.md)",
-        BoardName::ANGLE_BITS
+        BoardName::ANGLE_BITS, joint(*sensor as u8)
     )]
     AngleBits {
         /// Which board.
         board: BoardName,
-        /// The first such link, from 1.
-        link: usize,
+        /// Number of the first such sensor (0: cart, 1: first link).
+        sensor: usize,
     },
     /// A link has a potentiometer that the board does not read.
     #[error(
@@ -57,14 +58,15 @@ pub enum BuildError {
         /// The first such link, from 1.
         link: usize,
     },
-    /// A link has an absolute sensor, and the board reads encoders alone.
+    /// An absolute sensor, and the board reads encoders alone.
     #[error(
-        "this board reads encoders alone, and link {link} has an absolute sensor (sensor_bits): use another board \
-         (docs/board.md), or write one that reads it (docs/own-board.md)"
+        "this board reads encoders alone, and the {} has an absolute sensor (sensor_bits): use another board \
+         (docs/board.md), or write one that reads it (docs/own-board.md)",
+        joint(*sensor as u8)
     )]
     AbsoluteSensor {
-        /// The first such link, from 1.
-        link: usize,
+        /// Number of the first such sensor (0: cart, 1: first link).
+        sensor: usize,
     },
     /// The board cannot make the rig's tick.
     #[error(

@@ -1,4 +1,4 @@
-//! Absolute sensors of the links: AS5047D or AS5047P, on one bus (SPI mode 1), all read at once.
+//! Absolute sensors of cart and links: AS5047D or AS5047P, on one bus (SPI mode 1), all read at once.
 //!
 //! Clock, select and command are the same for all of them; each has its data line, at the pin that is channel A of an
 //! encoder's. The time of a tick does not depend on how many they are, or what they answer.
@@ -124,7 +124,7 @@ fn transfer(command: u16) -> [u16; SENSORS] {
                 })*
             };
         }
-        take!(1 2 3 4);
+        take!(0 1 2 3 4);
     }
     asm::delay(PAUSE);
     pins::set(SELECT, true);

@@ -47,7 +47,7 @@ fn pin(wire: &Wire) -> String {
 fn row(wire: &Wire, has_bus: bool) -> String {
     let pull_up = if wire.pull_up { "pull-up" } else { "" };
     let data = match wire.signal {
-        Signal::Encoder(1.., b'A') if has_bus => "; or MISO",
+        Signal::Encoder(_, b'A') if has_bus => "; or MISO",
         Signal::Encoder(1, b'B') if has_bus => "; or wiper",
         _ => "",
     };

@@ -18,7 +18,8 @@ pub(super) const ANY_IS_ON_BUS: bool = {
     let (mut any, mut sensor) = (false, 0);
     while sensor < SENSORS {
         if is_on_bus(sensor) {
-            assert!(TABLE.limits.turn_counts[sensor] == 1 << BITS, "an absolute sensor of other bits");
+            let turn = TABLE.absolute.turn_counts(&TABLE.limits, sensor);
+            assert!(turn == 1 << BITS, "an absolute sensor of other bits");
             any = true;
         }
         sensor += 1;

@@ -7,7 +7,7 @@ use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
-use super::link::{self, LINK, Link};
+use super::link::{self, LINK, Link, is_zero};
 use super::model::{self, LinearPlant};
 
 /// Largest number of links of a chain; plants with more are not compiled.
@@ -53,6 +53,13 @@ keys! {
         encoder_step_m: Option<f64>, "m", Rule::POSITIVE,
             "travel per encoder count; none with kind = \"acceleration\", which counts its pulses",
             Absent::Follows("no encoder; required with [kalman]");
+        #[serde(skip_serializing_if = "Option::is_none")]
+        sensor_bits: Option<f64>, "bits", Rule::BITS,
+            "resolution of an absolute sensor at its pulley, instead of the encoder",
+            Absent::Follows("an encoder");
+        #[serde(skip_serializing_if = "is_zero")]
+        sensor_noise_m: f64, "m", Rule::NOISE_M,
+            "noise of this sensor besides rounding, root mean square", Absent::Numbers(&[0.0]);
     }
 }
 
@@ -218,15 +225,24 @@ fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
 /// A force moves a mass; a drive that imposes an acceleration also knows where it has put the cart.
 fn cart_driven_by(input: CartInput, table: &Table<'_>) -> Result<Cart, RigError> {
     let cart = Cart::read(table)?;
-    match (input, table.get("encoder_step_m")) {
+    let given = ["encoder_step_m", "sensor_bits", "sensor_noise_m"].map(|key| table.get(key));
+    match (input, given.iter().flatten().next()) {
         (CartInput::Force, _) if cart.mass_kg.is_none() => {
             Err(table.missing("mass_kg", &table.asks_for("mass_kg")))
         }
         (CartInput::Acceleration, Some(node)) => Err(node.out_of_range(
-            "no encoder of the cart with kind = \"acceleration\" in [actuator]",
+            "no encoder or sensor of the cart with kind = \"acceleration\" in [actuator]",
             "leave it out: the drive's pulses are the position, and step_m of [actuator] is its step",
         )),
-        _ => Ok(cart),
+        _ => match given {
+            [None, Some(_), _] => {
+                Err(table.missing("encoder_step_m", "the travel per count of the sensor in m"))
+            }
+            [_, None, Some(_)] => {
+                Err(table.missing("sensor_bits", "the bits per turn of the absolute sensor"))
+            }
+            _ => Ok(cart),
+        },
     }
 }
 

@@ -27,6 +27,8 @@ pub(crate) fn chain(cart_mass_kg: f64, links: Vec<Link>) -> Chain {
             friction_n_s_per_m: 0.0,
             travel_m: [-2.0, 2.0],
             encoder_step_m: None,
+            sensor_bits: None,
+            sensor_noise_m: 0.0,
         },
         links,
         gravity_m_per_s2: 9.81,

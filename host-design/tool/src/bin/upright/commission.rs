@@ -76,7 +76,7 @@ impl CommissionCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         commissionable(&rig)?;
-        if self.zeros && rig.sensors().iter().all(|sensor| sensor.absolute.is_none()) {
+        if self.zeros && rig.sensors().iter().skip(1).all(|sensor| sensor.absolute.is_none()) {
             let file = self.rig.display();
             return Err(Failure::argument(format!("{file}: no link has an absolute sensor: sensor_bits")));
         }
