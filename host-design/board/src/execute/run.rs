@@ -71,9 +71,10 @@ impl Microcontroller {
         deadline.clamp(self.bus.now + 1, end.max(self.bus.now + 1))
     }
 
-    /// WFI or WFE: wakes if an exception or event is pending, else advances time to the next deadline in whole clocks.
+    /// WFI or WFE: wakes if an exception is pending, else advances time to the next deadline in whole clocks. The event
+    /// that each exception leaves behind ends no WFI (B1.5.19), and WFE only before it sleeps.
     fn sleep(&mut self, end: Time) {
-        if self.wakes() || std::mem::take(&mut self.event) {
+        if self.wakes() {
             self.asleep = false;
             self.bus.system.nvic.changed = true;
             return;

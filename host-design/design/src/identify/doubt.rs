@@ -69,13 +69,18 @@ impl core::fmt::Display for Doubt {
                     names.join("; ")
                 )
             }
-            Doubt::LargerAtRest([cart, joints]) => write!(
-                f,
-                "Dry friction at rest is larger than in motion: of the cart by about {:.0} %, of the joints by about {:.0} %. The dry \
-                 frictions above are those in motion; give breakaway_percent in [reality].",
-                100.0 * cart,
-                100.0 * joints
-            ),
+            Doubt::LargerAtRest(excesses) => {
+                let parts = ["cart", "joints"].into_iter().zip(excesses).filter(|(_, excess)| **excess > 0.0);
+                let parts: Vec<String> = parts
+                    .map(|(part, excess)| format!("of the {part} by about {:.0} %", 100.0 * excess))
+                    .collect();
+                write!(
+                    f,
+                    "Dry friction at rest is larger than in motion: {}. The dry frictions above are those in motion; give \
+                     breakaway_percent in [reality].",
+                    parts.join(", ")
+                )
+            }
             Doubt::NeverSticks(speed) => write!(
                 f,
                 "The cart never sticks: below about {} mm/s its dry friction falls with the speed. The law of friction is not that \

@@ -235,6 +235,35 @@ fn a_noisy_sensor_that_stands_still_is_found_within_a_fifth_of_a_second_and_one_
     assert!(ticks > most, "{found:?} {ticks}");
 }
 
+/// What ends 60 s of balancing, in each of some runs, of a machine whose sensors have this share of the stated noise.
+fn quieter(name: &str, share: f64, runs: u64) -> Vec<Option<Fault>> {
+    let file = rig(name);
+    let values = table(&file);
+    let mut real = file.clone();
+    for link in &mut real.chain_mut().unwrap().links {
+        if let Some(LinkEncoder::Absolute { noise_rad, .. }) = &mut link.encoder {
+            *noise_rad *= share;
+        }
+    }
+    let one = |seed| {
+        let scenario = Scenario { duration_s: 60.0, seed, ..Scenario::at_rest(&real, Law::Lqr) };
+        let run = with_firmware(&values, |firmware| record(&real, &values, &scenario, firmware));
+        run.unwrap().unwrap().fault
+    };
+    (1..=runs).map(one).collect()
+}
+
+#[test]
+fn a_sensor_that_is_quieter_than_stated_is_no_frozen_one() {
+    for name in ["single-absolute", "double-absolute"] {
+        for share in [1.0, 0.1] {
+            assert_eq!(quieter(name, share, 3), [None; 3], "{name} {share}");
+        }
+        // Negative control: so quiet is no sensor of this file.
+        assert_eq!(quieter(name, 0.0, 3), [Some(Fault::Frozen); 3], "{name}");
+    }
+}
+
 #[test]
 fn a_sensor_without_a_good_sample_is_a_fault_with_the_motor_off_too_and_comes_again() {
     let rig = absolute("single-quanser-ip02", 4e-4);

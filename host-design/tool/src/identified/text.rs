@@ -163,6 +163,13 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
             100.0 * WITHOUT_ECCENTRICITY
         ));
     }
+    if found.is_driven && found.channels.iter().filter(|fit| fit.channel > 0).count() > 2 {
+        notes.push(
+            "With three links or more it is not known whether dry friction is larger at rest than in motion. If it is, frictions \
+             may be wrong by more than their deviations."
+                .to_owned(),
+        );
+    }
     if found.largest_angle_rad < LARGE_ENOUGH_RAD {
         notes.push(format!(
             "The links came only {:.0}° from hanging: shake more; the scale is twenty times better known at 60° than at 10°.",

@@ -5,7 +5,7 @@ use upright::supervision::fault::Fault;
 use upright::table::Law;
 use upright_board::{Conditions, Image, Input, SensorDefect};
 use upright_design::design::design;
-use upright_design::harness::{Harness, Recording, record};
+use upright_design::harness::{Harness, Recording};
 use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::swing_up::{Stored, hangs, refined, up_and_down, with_motions};
@@ -88,9 +88,27 @@ fn the_image_raises_and_lowers_links_with_absolute_sensors() {
     for (rig, table) in magnets.into_iter().chain([&(rig, table)]) {
         let name = &rig.name;
         let Some(image) = image(rig, table) else { return };
-        let mut board = VirtualBoard::start(&image, &Conditions::f405(1), table).unwrap();
-        let recording = record(rig, table, &up_and_down(rig, table, 0.5).unwrap(), &mut board).unwrap();
-        assert!(hangs(&recording), "{name}: {:?}", recording.fault);
+        for seed in 1..4 {
+            let mut board = VirtualBoard::start(&image, &Conditions::f405(seed), table).unwrap();
+            let scenario = Scenario { seed, ..up_and_down(rig, table, 0.5).unwrap() };
+            let (recording, _) = run_compared(rig, table, &scenario, &mut board).unwrap();
+            assert!(hangs(&recording), "{name} {seed}: {:?}", recording.fault);
+        }
+    }
+}
+
+#[test]
+fn noise_of_sensors_and_of_forces_leaves_the_bits_those_of_the_host() {
+    for name in ["double-absolute", "single-quanser-ip02"] {
+        let (rig, table) = rig_and_table(name);
+        let Some(image) = image(rig, table) else { return };
+        for seed in 1..8 {
+            let mut board = VirtualBoard::start(&image, &Conditions::f405(seed), table).unwrap();
+            let scenario = Scenario { duration_s: 0.5, ..at_rest_disturbed(rig, Law::Lqr, seed) };
+            let (recording, [_, messages]): (Recording, _) =
+                run_compared(rig, table, &scenario, &mut board).unwrap();
+            assert!(recording.fault.is_none() && messages > 100, "{name} {seed}: {:?}", recording.fault);
+        }
     }
 }
 
@@ -136,8 +154,7 @@ fn of_sensor(encoder: usize, defect: SensorDefect) -> Option<Input> {
 
 #[test]
 fn the_image_balances_with_a_potentiometer_with_the_bits_of_the_host() {
-    // Without noise: a command that the board executes a tick before the host begins the sign check at another count.
-    let (rig, table) = potentiometer(0.0);
+    let (rig, table) = potentiometer(1e-3);
     let Some(image) = image(&rig, &table) else { return };
     let start = || VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
     let scenario = Scenario { duration_s: 4.0, ..Scenario::at_rest(&rig, Law::Lqr) };

@@ -122,7 +122,8 @@ const LINK_KEYS: &[Key] = &[
         name: "sensor_noise_rad",
         unit: "rad",
         rule: Rule::NOISE,
-        meaning: "noise of this sensor besides the rounding to its bits, root mean square",
+        meaning: "noise of this sensor besides the rounding to its bits, root mean square; a tenth of it or more is real, or a link at rest \
+                  is taken for a frozen sensor",
         absent: Absent::Numbers(&[0.0]),
     },
     Key {
