@@ -93,7 +93,8 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
         }
-        if !(0.0..=1.25).contains(&self.pending_acts) || !(0.0..=1.0).contains(&self.pending_stays) {
+        // With delay and lag, the first one is above 1.
+        if [0.8 * self.pending_acts, self.pending_stays].iter().any(|share| !(0.0..=1.0).contains(share)) {
             return Err(TableError::Delay);
         }
         let mut measured = self.observer.iter().flat_map(|observer| &observer.measured);

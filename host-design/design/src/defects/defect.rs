@@ -150,9 +150,8 @@ impl Defect {
 
     /// Whether only an absolute sensor can have it.
     pub fn is_of_absolute(self) -> bool {
-        let without_frames =
-            matches!(self, Self::SensorDead | Self::SensorBit | Self::SampleInvalid | Self::SensorWire);
-        without_frames || self.is_of_frames()
+        self.is_of_frames()
+            || matches!(self, Self::SensorDead | Self::SensorBit | Self::SampleInvalid | Self::SensorWire)
     }
 
     /// Whether not every sensor can have it: only absolute ones, or only encoders.
