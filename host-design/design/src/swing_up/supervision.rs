@@ -21,8 +21,8 @@ const BALANCE_S: f64 = 1.5;
 const MARGIN: f64 = 2.0;
 /// The allowed distance of the cart from its planned position is at least this (m).
 const LEAST_DEVIATION_M: f64 = 0.02;
-/// The same on a stepper, where no defect of the motor moves the cart in the pulses' count: with 20 mm, runs that arrive
-/// from starts that just count as hanging are stopped.
+/// The same on a stepper, where no defect of the motor moves the cart in the pulses' count: with 20 mm, runs that
+/// arrive from starts that just count as hanging are stopped.
 const LEAST_DEVIATION_ON_STEPPER_M: f64 = 0.03;
 /// Factor on the largest speed of the cart that the machines reach.
 const SPEED_MARGIN: f64 = 1.2;
