@@ -55,6 +55,25 @@ fn gains_are_those_of_an_independent_design_with_the_mean_speed_held() {
     let held =
         [17.7195, 19.5598, -87.4031, -28.8072, -959.071, -27.0942, 2980.97, 14.5628, -3112.41, -134.355];
     assert!(!are_close(&gains, &held));
+    let gains = sampled_gains(&stepper("single-quanser-ip02", 0.127259, 0.005));
+    assert!(are_close(&gains, &[-37.5382, -27.4366, 107.247, 21.1239]), "{gains:?}");
+}
+
+/// A public machine. Of it, only gains for a held acceleration are known, from the integral of the cost and from its sum
+/// over ticks: link and weights are the ones that give them. Held speeds have the gains of below in another program.
+#[test]
+fn gains_of_a_public_machine_are_those_of_another_program() {
+    let mut rig = stepper("single-quanser-ip02", 0.04, 0.01);
+    rig.lqr.as_mut().unwrap().state_weights = vec![24.99938, 3.99994, 32.84086, 0.24980];
+    let link = &mut rig.chain_mut().unwrap().links[0];
+    (link.length_m, link.friction_n_m_s_per_rad) = (0.21518352 * 1.5, 0.0);
+    (link.centre_of_mass_m, link.inertia_kg_m2) = (None, None);
+    let gains = sampled_gains(&rig);
+    assert!(are_close(&gains, &[-21.5582, -18.3660, 69.6122, 9.87655]), "{gains:?}");
+    // Negative controls: those for a held acceleration, and with the sum over ticks.
+    for other in [[-21.5385, -18.3507, 69.5947, 9.87466], [-21.4998, -18.3199, 69.5054, 9.86244]] {
+        assert!(!are_close(&gains, &other), "{other:?}");
+    }
 }
 
 /// Solved for the force that gives the cart an acceleration a, the model of the force is that of the acceleration.
@@ -180,6 +199,17 @@ fn a_quadruple_balances_on_pulses() {
     coarse.actuator.acceleration.as_mut().unwrap().step_m *= 2.0;
     let (summary, _) = run(&coarse, &table(&rig), &balancing(&rig));
     assert!(!summary.survives(), "{summary}");
+}
+
+#[test]
+fn a_quadruple_stands_on_pulses_of_100_um_and_falls_on_those_of_150_um() {
+    for (step_m, stands) in [(50e-6, true), (100e-6, true), (150e-6, false), (200e-6, false)] {
+        let mut rig = quadruple();
+        rig.actuator.acceleration.as_mut().unwrap().step_m = step_m;
+        let (summary, rms) = run(&rig, &table(&rig), &balancing(&rig));
+        println!("{step_m} m: {rms} m/s² rms, {summary}");
+        assert_eq!(summary.survives(), stands, "{step_m} m: {summary}");
+    }
 }
 
 /// Every path of the set-point leaves half of the drive's acceleration and speed.
