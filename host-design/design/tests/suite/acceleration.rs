@@ -59,8 +59,8 @@ fn gains_are_those_of_an_independent_design_with_the_mean_speed_held() {
     assert!(are_close(&gains, &[-37.5382, -27.4366, 107.247, 21.1239]), "{gains:?}");
 }
 
-/// Of a public machine only gains for a held acceleration are known, from the integral of the cost and from its sum over
-/// ticks. Link and weights are the ones that give them; those for held speeds are of another program.
+/// Of a public machine only gains for a held acceleration are known, from the integral of the cost and from its sum
+/// over ticks. Link and weights are the ones that give them; those for held speeds are of another program.
 #[test]
 fn gains_of_a_public_machine_are_those_of_another_program() {
     let mut rig = stepper("single-quanser-ip02", 0.04, 0.01);
