@@ -169,7 +169,7 @@ impl Record {
 
     /// Total duration of all pieces (s).
     pub(super) fn seconds(&self) -> f64 {
-        (0..self.pieces.len()).map(|piece| self.samples(piece) as f64 * self.dt_s).sum()
+        (0..self.pieces.len()).map(|piece| self.samples(piece)).sum::<usize>() as f64 * self.dt_s
     }
 
     /// The samples from `from_s` to `to_s`, where time is counted across the pieces without the gaps.

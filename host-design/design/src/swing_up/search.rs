@@ -6,7 +6,8 @@
 //! 2. Refinement from knots to ticks, with the force held over each tick, until the gaps are below 2e-8.
 //! 3. Gains: a linear quadratic regulator along the motion with the weights of `[lqr]`, but four times those of the
 //!    positions, because a link that leaves its plan soon falls. The terminal cost is the stationary one. A Kalman
-//!    filter expects more noise than at rest: 100 times at the joints, 10 times at the cart, plus wrong friction.
+//!    filter expects more noise than at rest: 100 times at the joints, 10 times at the cart, plus wrong friction. Both
+//!    are slower for a long chain on a stepper.
 //! 4. Selection: the score is from runs with every mass wrong by 0.5 % and all friction wrong by the spread, without
 //!    noise. The 30 best are tested with 40 random runs each, and the best four of these with 160, with the control law
 //!    alone in f64 and the unmodified weights of `[lqr]`, so that weak motions are exposed.
