@@ -9,6 +9,11 @@ pub(crate) fn lag_s(rig: &Rig) -> f64 {
     rig.actuator.driver_lag_s.unwrap_or(0.0)
 }
 
+/// Whether the force is a tick late, without a lag: then the laws feed back the whole pending force.
+pub(super) fn is_late_alone(rig: &Rig) -> bool {
+    rig.tick.delay_ticks == 1 && lag_s(rig) == 0.0
+}
+
 /// Whether the force begins a tick late and then follows with a lag: one pending force stands for both.
 pub(super) fn is_late_and_lags(rig: &Rig) -> bool {
     rig.tick.delay_ticks == 1 && lag_s(rig) > 0.0

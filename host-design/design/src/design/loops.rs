@@ -1,7 +1,7 @@
 //! The closed loops of a design and their poles.
 
 use super::error::DesignError;
-use super::lag::{force_last, is_late_and_lags, shares, with_lag, with_pending};
+use super::lag::{force_last, is_late_alone, is_late_and_lags, shares, with_lag, with_pending};
 use super::synthesis::{Design, Feedback, with_integral};
 use super::zero_order_hold::zero_order_hold;
 use crate::numerics::{Complex, Matrix, Real, eigenvalues};
@@ -96,7 +96,7 @@ impl<R: Real> Design<R> {
         let n = law.n.as_ref()?;
         let (states, period) = (self.ad.rows(), R::from_f64(rig.tick.period_s));
         let mut input = Matrix::zeros(law.k.cols(), 1);
-        if rig.tick.delay_ticks == 1 && self.lag_s == 0.0 {
+        if is_late_alone(rig) {
             input[(law.k.cols() - 1, 0)] = n.clone();
         } else {
             let (_, b) = self.over_law(rig, law, self.commanded(rig), [&period, &R::one()]);

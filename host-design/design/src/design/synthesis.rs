@@ -4,7 +4,9 @@ use super::diagnosis::{why_no_lqr, why_no_placement};
 use super::error::{DesignError, Task};
 use super::hold::Hold;
 use super::kalman::{Kalman, kalman};
-use super::lag::{cost_with_pending, force_last, is_late_and_lags, lag_s, shares, widened, with_lag};
+use super::lag::{
+    cost_with_pending, force_last, is_late_alone, is_late_and_lags, lag_s, shares, widened, with_lag,
+};
 use super::place::{Pole, dominant_pair, place};
 use super::riccati::{Cost, care, dare};
 
@@ -121,7 +123,7 @@ impl<R: Real> Design<R> {
         let lag_s = lag_s(rig);
         let further = usize::from(lag_s > 0.0);
         let output = rig.output();
-        let late = rig.tick.delay_ticks == 1 && lag_s == 0.0;
+        let late = is_late_alone(rig);
         let plant =
             Self { continuous: Laws::none(), sampled: Laws::none(), kalman: None, a, b, ad, bd, lag_s };
         let (a_u, b_u) = plant.commanded(rig);

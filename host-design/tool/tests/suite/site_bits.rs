@@ -18,6 +18,9 @@ use crate::twin_page::comes_within;
 /// Rigs that the firmware does not run on the host: a model with ten states, of which only the table is compared.
 const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
 
+/// Name of a rig that is no example of the page.
+const LATE: &str = "late";
+
 /// All rigs of the project, and one whose force and readings are late: name, text, stored motions.
 fn rigs() -> Vec<(String, String, Option<String>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
@@ -31,9 +34,6 @@ fn rigs() -> Vec<(String, String, Option<String>)> {
         .map(|file| (name(file), read(file).unwrap(), read(&file.with_extension("swing-up.json"))));
     published.chain([(LATE.to_owned(), late_rig(), None)]).collect()
 }
-
-/// Name of a rig that is no example of the page.
-const LATE: &str = "late";
 
 /// The text of a rig whose force begins a tick late and lags, and whose sensor is slow.
 pub(crate) fn late_rig() -> String {

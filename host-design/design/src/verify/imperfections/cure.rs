@@ -62,8 +62,8 @@ impl<'a> Cures<'a> {
     /// `[actuator]` with this lag of the driver (s), for which the law is designed; none if one is stated already, or
     /// where none can be.
     fn stating(&self, lag_s: f64) -> Option<(String, TableValues)> {
-        let is_free = self.rig.actuator.driver_lag_s.is_none();
-        if !is_free || !self.rig.actuator.input().is_force() {
+        let actuator = &self.rig.actuator;
+        if actuator.driver_lag_s.is_some() || !actuator.input().is_force() {
             return None;
         }
         let mut rig = self.rig.with_law_alone(self.law);
