@@ -11,6 +11,7 @@ use upright::control::state_feedback::saturate;
 use upright::table::{
     AbsoluteZeros, FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
 };
+use upright_design::table::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_size};
 
 /// Structure of Ad, which decides the code path of the prediction.
 #[derive(Debug, Clone, Copy)]
@@ -93,9 +94,10 @@ fn table<const NX: usize, const NY: usize>(
     table
 }
 
-/// The equations as documented, entry by entry.
+/// The equations as documented, entry by entry, for the first `states` of the table.
 struct Plain<'t, const NX: usize, const NY: usize> {
     table: &'t GainTable<NX, NY>,
+    states: usize,
     x: [f32; NX],
     setpoint: f32,
     integral: f32,
@@ -103,8 +105,8 @@ struct Plain<'t, const NX: usize, const NY: usize> {
 }
 
 impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
-    fn started(table: &'t GainTable<NX, NY>) -> Self {
-        Self { table, x: [0.0; NX], setpoint: 0.0, integral: 0.0, pending: 0.0 }
+    fn started(table: &'t GainTable<NX, NY>, states: usize) -> Self {
+        Self { table, states, x: [0.0; NX], setpoint: 0.0, integral: 0.0, pending: 0.0 }
     }
 
     /// Computes innovation, estimate and requested force, then prepares the next tick.
@@ -118,8 +120,9 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
         let x: [f32; NX] =
             core::array::from_fn(|i| (0..NY).fold(self.x[i], |sum, j| sum + observer.l[(i, j)] * e[j]));
         self.setpoint += saturate(target - self.setpoint, law.setpoint_step);
-        let over =
-            |start: f32, first: usize| (first..NX).step_by(2).fold(start, |sum, i| sum - law.k[i] * x[i]);
+        let over = |start: f32, first: usize| {
+            (first..self.states).step_by(2).fold(start, |sum, i| sum - law.k[i] * x[i])
+        };
         let rate = |i: usize| x.get(2 * i + 1).copied().unwrap_or_default();
         let friction: [f32; NY] = core::array::from_fn(|i| {
             let map = self.table.friction.as_ref();
@@ -143,7 +146,8 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
         self.pending = applied + self.table.pending_stays * behind;
         self.x = core::array::from_fn(|i| {
             let effect = |j: usize| self.table.friction.as_ref().map_or(-0.0, |map| map.effect[(i, j)]);
-            let linear = (0..NX).fold(observer.bd[i] * now, |sum, j| sum + observer.ad[(i, j)] * x[j]);
+            let linear =
+                (0..self.states).fold(observer.bd[i] * now, |sum, j| sum + observer.ad[(i, j)] * x[j]);
             (0..NY).fold(linear, |sum, j| sum + effect(j) * friction[j])
         });
         e.into_iter().chain(x).chain([requested, applied]).chain(self.x).collect()
@@ -152,15 +156,16 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
 
 type Ticks<const NY: usize> = Vec<(f32, [u32; NY])>;
 
-/// The first difference between the firmware with `table` and the equations with `plain`.
+/// The first difference between the firmware with `table` and the equations with the first `states` of `plain`.
 fn difference<const NX: usize, const NY: usize>(
     table: &GainTable<NX, NY>,
     plain: &GainTable<NX, NY>,
+    states: usize,
     ticks: &Ticks<NY>,
 ) -> Option<String> {
     let mut controller = Controller::new(table, [CounterWidth::Bits32; NY]).unwrap();
     controller.start(&[0; NY]).unwrap();
-    let mut plain = Plain::started(plain);
+    let mut plain = Plain::started(plain, states);
     ticks.iter().enumerate().find_map(|(tick, (target, counts))| {
         controller.set_setpoint(*target).unwrap();
         let command = controller.control(counts);
@@ -199,7 +204,8 @@ fn same_bits<const NX: usize, const NY: usize>(patterns: impl Strategy<Value = P
     let inputs = (patterns, any::<bool>(), shares, any::<[bool; 2]>(), numbers(), ticks::<NY>());
     let same = |(pattern, in_order, delay, options, numbers, ticks): (_, _, _, _, Vec<f32>, _)| {
         let table = table::<NX, NY>(pattern, in_order, delay, options, &numbers);
-        difference(&table, &table, &ticks).map_or(Ok(()), |difference| Err(TestCaseError::fail(difference)))
+        difference(&table, &table, NX, &ticks)
+            .map_or(Ok(()), |difference| Err(TestCaseError::fail(difference)))
     };
     TestRunner::default().run(&inputs, same).unwrap();
 }
@@ -214,6 +220,60 @@ fn a_tick_gives_the_bits_of_the_plain_equations() {
     same_bits::<1, 1>(Just(Pattern::Any));
 }
 
+/// A controller with room for more states than its table has, on the host: against the equations of the table alone.
+struct WithRoom {
+    states: usize,
+    spoilt: bool,
+}
+
+impl WithSize for WithRoom {
+    type Output = Option<String>;
+
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Option<String> {
+        let (states, numbers) = (self.states, (1..252).map(|i| ((i * 37 % 97) as f32 - 48.5) / 64.0));
+        let numbers: Vec<f32> = numbers.collect();
+        let mut table = table::<NX, NY>(Pattern::Any, true, [0.75, 0.625], [true, false], &numbers);
+        let (law, observer) = (table.laws.lqr.as_mut().unwrap(), table.observer.as_mut().unwrap());
+        for beyond in states..NX {
+            law.k[beyond] = 0.0;
+            observer.bd[beyond] = 0.0;
+            observer.ad.row_mut(beyond).fill(0.0);
+            observer.ad.column_mut(beyond).fill(0.0);
+            observer.l.row_mut(beyond).fill(0.0);
+        }
+        observer.measured = observer.measured.map(|state| state.min(states as u32 - 1));
+        if self.spoilt {
+            observer.ad[(states - 1, 0)] += 0.25;
+        }
+        let mut padded = table;
+        if self.spoilt {
+            padded.observer.as_mut().unwrap().ad[(states - 1, 0)] -= 0.25;
+        }
+        padded.crc = padded.checksum();
+        let counts = |tick: i32| core::array::from_fn(|sensor| (tick * (sensor as i32 + 3) % 19 - 9) as u32);
+        let ticks: Ticks<NY> = (0..20).map(|tick| (0.5, counts(tick))).collect();
+        difference(&padded, &table, states, &ticks)
+    }
+}
+
+#[test]
+fn a_controller_with_room_for_more_states_gives_the_same_bits_for_every_size_of_a_rig_file() {
+    let models =
+        (1..=MAX_STATES).flat_map(|states| (1..=MAX_MODEL_SENSORS).map(move |sensors| (states, sensors)));
+    let chains = (1..MAX_SENSORS).map(|links| (2 * links + 2, links + 1));
+    for (states, sensors) in models.chain(chains) {
+        let differs = |spoilt| with_size(states, sensors, WithRoom { states, spoilt }).unwrap();
+        assert_eq!(differs(false), None, "{states} states, {sensors} sensors");
+        assert!(differs(true).is_some(), "{states} states, {sensors} sensors");
+    }
+    for (states, sensors) in [(0, 1), (31, 1), (5, 3), (8, 3)] {
+        assert!(
+            with_size(states, sensors, WithRoom { states, spoilt: false }).is_none(),
+            "{states}, {sensors}"
+        );
+    }
+}
+
 proptest! {
     /// Every single entry matters: the comparison above would notice a shortcut that skips one.
     #[test]
@@ -225,9 +285,9 @@ proptest! {
         *entry = if *entry == 0.0 { 0.25 } else { f32::from_bits(entry.to_bits() ^ 1 << 20) };
         other.crc = other.checksum();
         let ticks = vec![(0.5, [3, 5, 7, 2, 1]); 3];
-        prop_assert_eq!(difference(&table, &table, &ticks), None);
-        prop_assert_eq!(difference(&other, &other, &ticks), None);
-        prop_assert!(difference(&table, &other, &ticks).is_some());
-        prop_assert!(difference(&other, &table, &ticks).is_some());
+        prop_assert_eq!(difference(&table, &table, 10, &ticks), None);
+        prop_assert_eq!(difference(&other, &other, 10, &ticks), None);
+        prop_assert!(difference(&table, &other, 10, &ticks).is_some());
+        prop_assert!(difference(&other, &table, 10, &ticks).is_some());
     }
 }

@@ -8,7 +8,7 @@ use upright::table::{Law, LawGains, ObserverGains};
 
 use super::initializer::Initializer;
 use crate::rig::Rig;
-use crate::table::{MAX_SENSORS, MAX_STATES, TableValues, WithSize, with_size};
+use crate::table::{MAX_SENSORS, MAX_STATES, TableValues};
 
 const HEAD: &str = include_str!("head.txt");
 const STEPS: &str = include_str!("steps.txt");
@@ -78,9 +78,9 @@ type WidestObserver = ObserverGains<MAX_STATES, MAX_SENSORS>;
 /// The preprocessor's constants, and the faults.
 fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Result {
     let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
-    let pattern = match with_size(table.states(), table.sensors(), Pattern(table)) {
-        Some(PredictionPattern::Frictionless) => 2,
-        Some(PredictionPattern::SameEverywhere) => 1,
+    let pattern = match table.observer.as_ref().map(WidestObserver::pattern) {
+        Some(PredictionPattern::Frictionless) if table.states() % 2 == 0 => 2,
+        Some(PredictionPattern::Frictionless | PredictionPattern::SameEverywhere) => 1,
         Some(PredictionPattern::Any) | None => 0,
     };
     let mut define = |name: &str, value: String| writeln!(out, "#define UPRIGHT_{name} {value}");
@@ -134,17 +134,6 @@ fn condition(fault: Fault) -> &'static str {
 /// Whether a sensor's reading is old.
 fn has_delay(observer: &WidestObserver) -> bool {
     observer.delay_s.iter().any(|&delay_s| delay_s != 0.0)
-}
-
-struct Pattern<'a>(&'a TableValues);
-
-impl WithSize for Pattern<'_> {
-    type Output = PredictionPattern;
-
-    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> PredictionPattern {
-        let table = self.0.table::<NX, NY>();
-        table.observer.map_or(PredictionPattern::Any, |observer| observer.pattern())
-    }
 }
 
 /// The members of `upright_table_type`, in the order of their declaration.

@@ -1,7 +1,7 @@
 //! The firmware's controller behind an interface without its numbers of states and sensors.
 //!
 //! These are parameters of the controller's type, so each pair is compiled separately. This applies only to the code
-//! in this file; the loop around it is compiled once.
+//! in this file; the loop around it is compiled once. A table may be smaller than its controller, see [`with_size`].
 
 use nalgebra::SVector;
 use upright::control::controller::{Controller, MotorCommand, Rejected};
@@ -49,6 +49,8 @@ struct SupervisedController<'t, const NX: usize, const NY: usize> {
     table: &'t GainTable<NX, NY>,
     controller: Controller<'t, NX, NY>,
     supervision: Option<BalancingSupervision<NY>>,
+    /// Number of states in use; those beyond are 0.
+    states: usize,
 }
 
 /// Fault detection, and the limits on state and force.
@@ -70,7 +72,7 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
     }
 
     fn start_in_state(&mut self, state: &[f32]) {
-        self.controller.start_in_state(&SVector::from_column_slice(state));
+        self.controller.start_in_state(&padded(state));
     }
 
     fn set_setpoint(&mut self, position_m: f32) -> Result<(), Rejected> {
@@ -90,7 +92,7 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
     }
 
     fn control_from_state(&mut self, state: &[f32]) -> MotorCommand {
-        let command = self.controller.control_from_state(&SVector::from_column_slice(state));
+        let command = self.controller.control_from_state(&padded(state));
         self.judge(&command, None);
         command
     }
@@ -107,7 +109,8 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
     }
 
     fn estimate(&self) -> &[f32] {
-        self.controller.estimate().as_slice()
+        let (in_use, _) = self.controller.estimate().as_slice().split_at(self.states);
+        in_use
     }
 
     fn governed_setpoint_m(&self) -> f32 {
@@ -137,6 +140,11 @@ impl<const NX: usize, const NY: usize> SupervisedController<'_, NX, NY> {
         let exceeded = envelope::exceeded(limits, self.controller.estimate().as_slice(), command.requested_n);
         supervision.fault = exceeded.or(found).or(of_force);
     }
+}
+
+/// `state`, and 0 for states beyond it.
+fn padded<const NX: usize>(state: &[f32]) -> SVector<f32, NX> {
+    SVector::from_fn(|row, _| state.get(row).copied().unwrap_or_default())
 }
 
 fn array<const N: usize>(counters: &[u32]) -> &[u32; N] {
@@ -189,9 +197,10 @@ impl WithSize for WithControllers<'_> {
     type Output = Result<Vec<Option<Fall>>, SimulationError>;
 
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
-        let table = self.table.table::<NX, NY>();
+        let table = self.table.padded::<NX, NY>();
         let controller = Controller::new(&table, Bench::widths())?;
-        let one = SupervisedController { table: &table, controller, supervision: None };
+        let states = self.table.states();
+        let one = SupervisedController { table: &table, controller, supervision: None, states };
         let mut controllers: Vec<Box<dyn AnyController>> = Vec::with_capacity(self.count);
         for _ in 0..self.count {
             controllers.push(Box::new(one.clone()));

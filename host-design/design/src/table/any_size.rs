@@ -1,7 +1,7 @@
 //! From numbers of states and sensors known at run time to the firmware's types, which take them as const parameters.
 //!
 //! Everything inside a [`WithSize`] is compiled once per size: only code that needs the numbers in a type belongs
-//! there.
+//! there, and few sizes are compiled.
 
 use nalgebra::SMatrix;
 use upright::table::{GainTable, Scalar};
@@ -25,36 +25,45 @@ pub trait WithSize {
     fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output;
 }
 
+/// Compares with `$nx` in the order of the list, which has to be ascending for each `$ny`.
 macro_rules! dispatch {
-    ($states:expr, $sensors:expr, $action:expr, $($nx:literal: $($ny:literal)*;)*) => {
-        match ($states, $sensors) {
-            $($(($nx, $ny) => Some($action.run::<$nx, $ny, { $ny - 1 }>()),)*)*
+    ($fits:ident($states:expr, $sensors:expr), $action:expr, $($ny:literal: $($nx:literal)*;)*) => {
+        match $sensors {
+            $($ny => {
+                $(if $fits($states, $nx) {
+                    return Some($action.run::<$nx, $ny, { $ny - 1 }>());
+                })*
+                None
+            })*
             _ => None,
         }
     };
 }
 
-/// Runs `action` with `NX = states` and `NY = sensors`; `None` for sizes that are not compiled on the host. The
-/// compiled sizes are 1 to [`MAX_STATES`] states with 1 to [`MAX_MODEL_SENSORS`] sensors, or 2n + 2 states with n + 1
-/// sensors; in a browser only the smaller ones, so that a page is loaded sooner.
+/// Runs `action` for the smallest compiled size that has room for `states` and exactly so many `sensors`: NX may be
+/// larger than `states`. `None` if there is none. The sizes of chains, 2n + 2 states with n + 1 sensors, are all
+/// compiled; a `[model]`, of up to [`MAX_STATES`] states with up to [`MAX_MODEL_SENSORS`] sensors, is padded to the next
+/// size with states that stay 0. In a browser there are only the smaller sizes, so that a page is loaded sooner.
 pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
+    let is_model = sensors <= MAX_MODEL_SENSORS;
+    let has_room = |states: usize, nx: usize| states == nx || (is_model && (1..nx).contains(&states));
     #[cfg(target_family = "wasm")]
-    dispatch! { states, sensors, action,
-        1: 1; 2: 1 2; 3: 1 2; 4: 1 2; 5: 1 2; 6: 1 2 3; 7: 1; 8: 1 4; 9: 1; 10: 1 5; 12: 6; 14: 7;
+    dispatch! { has_room(states, sensors), action,
+        1: 2 6 10; 2: 4 6; 3: 6; 4: 8; 5: 10; 6: 12; 7: 14;
     }
     #[cfg(not(target_family = "wasm"))]
-    dispatch! { states, sensors, action,
-        1: 1; 2: 1 2; 3: 1 2; 4: 1 2; 5: 1 2; 6: 1 2 3; 7: 1 2; 8: 1 2 4; 9: 1 2; 10: 1 2 5; 11: 1 2; 12: 1 2 6; 13: 1 2;
-        14: 1 2 7; 15: 1 2; 16: 1 2 8; 17: 1 2; 18: 1 2 9; 19: 1 2; 20: 1 2 10; 21: 1 2; 22: 1 2 11; 23: 1 2; 24: 1 2 12;
-        25: 1 2; 26: 1 2 13; 27: 1 2; 28: 1 2 14; 29: 1 2; 30: 1 2 15;
+    dispatch! { has_room(states, sensors), action,
+        1: 2 6 14 30; 2: 4 8 16 30; 3: 6; 4: 8; 5: 10; 6: 12; 7: 14; 8: 16; 9: 18; 10: 20; 11: 22; 12: 24; 13: 26; 14: 28;
+        15: 30;
     }
 }
 
-/// As [`with_size`], for the sizes with which the whole firmware runs on the host: chains of 1 to 6 links, and models
-/// of up to 6 states with one sensor. More sizes would only take longer to compile.
+/// As [`with_size`], but for exactly so many states, for the sizes with which the whole firmware runs on the host: chains
+/// of 1 to 6 links, and models of up to 6 states with one sensor. More sizes would only take longer to compile.
 pub fn with_firmware_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
-    dispatch! { states, sensors, action,
-        1: 1; 2: 1; 3: 1; 4: 1 2; 5: 1; 6: 1 3; 8: 4; 10: 5; 12: 6; 14: 7;
+    let is_exact = |states: usize, nx: usize| states == nx;
+    dispatch! { is_exact(states, sensors), action,
+        1: 1 2 3 4 5 6; 2: 4; 3: 6; 4: 8; 5: 10; 6: 12; 7: 14;
     }
 }
 

@@ -1,7 +1,10 @@
 //! A table's names and values as a tree: the common source of everything that writes a table.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
+use upright::table::checksum::crc32;
 use upright::table::{Part, Reader, Shape, Words};
+
+use super::any_size::{MAX_SENSORS, MAX_STATES, WidestTable};
 
 /// A value of the tree.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +46,66 @@ pub(super) fn fields(table: &impl Part) -> Vec<Field> {
     let mut builder = Builder::default();
     table.read(&mut builder);
     builder.fields()
+}
+
+/// As [`fields`], without the entries of states and sensors that the table does not have.
+///
+/// Nothing else in a table has as many entries as there are states or sensors at most, so that its length in the widest
+/// table tells what a list or a matrix has entries for.
+pub(super) fn in_use(widest: &WidestTable, states: usize, sensors: usize) -> Vec<Field> {
+    let length = |widest: usize| match widest {
+        MAX_STATES => states,
+        MAX_SENSORS => sensors,
+        other => other,
+    };
+    let mut fields = fields(widest);
+    fields.iter_mut().for_each(|field| trim(&mut field.value, &length));
+    fields
+}
+
+fn trim(node: &mut TableNode, length: &dyn Fn(usize) -> usize) {
+    match node {
+        TableNode::List(numbers) => numbers.truncate(length(numbers.len())),
+        TableNode::Columns(columns) => {
+            columns.truncate(length(columns.len()));
+            columns.iter_mut().for_each(|column| column.truncate(length(column.len())));
+        }
+        TableNode::Struct(_, fields) => fields.iter_mut().for_each(|field| trim(&mut field.value, length)),
+        TableNode::Optional(node) => node.iter_mut().for_each(|node| trim(node, length)),
+        TableNode::Structs(nodes) => nodes.iter_mut().for_each(|node| trim(node, length)),
+        TableNode::Value(_) | TableNode::Slice(_) => {}
+    }
+}
+
+/// The checksum of a table with these fields: that of its words, as the firmware computes it.
+pub(super) fn checksum(fields: &[Field]) -> u32 {
+    crc32(0, &all_bytes(fields))
+}
+
+/// Bytes of the words of these fields.
+pub(super) fn bytes(fields: &[Field]) -> usize {
+    all_bytes(fields).len()
+}
+
+/// The words of these fields in the order of declaration, the low byte first.
+fn all_bytes(fields: &[Field]) -> Vec<u8> {
+    fields.iter().flat_map(|field| bytes_of(&field.value)).collect()
+}
+
+/// The words of `node`. An optional struct is one word, 1 or 0, and its fields if it is there.
+fn bytes_of(node: &TableNode) -> Vec<u8> {
+    let of = |numbers: &[TableNumber]| numbers.iter().flat_map(TableNumber::bytes).collect();
+    match node {
+        TableNode::Value(number) => number.bytes(),
+        TableNode::List(numbers) | TableNode::Slice(numbers) => of(numbers),
+        TableNode::Columns(columns) => of(&columns.concat()),
+        TableNode::Struct(_, fields) => all_bytes(fields),
+        TableNode::Optional(node) => {
+            let is_there = TableNumber::Integer(node.is_some().into()).bytes();
+            is_there.into_iter().chain(node.iter().flat_map(|node| bytes_of(node))).collect()
+        }
+        TableNode::Structs(nodes) => nodes.iter().flat_map(bytes_of).collect(),
+    }
 }
 
 #[derive(Default)]
@@ -136,6 +199,17 @@ impl Reader for Builder {
     fn end(&mut self) {
         if let Some((name, fields)) = self.open.pop() {
             self.value(TableNode::Struct(name, fields));
+        }
+    }
+}
+
+impl TableNumber {
+    /// Its words, the low byte first.
+    fn bytes(&self) -> Vec<u8> {
+        match *self {
+            TableNumber::Float(value) => value.to_le_bytes().to_vec(),
+            TableNumber::Integer(value) => (value as u32).to_le_bytes().to_vec(),
+            TableNumber::Hash(value) => value.to_le_bytes().to_vec(),
         }
     }
 }

@@ -134,7 +134,7 @@ impl TableValues {
         {
             return Err(NoTable::Size { states, sensors });
         }
-        with_size(states, sensors, Checksum(&values)).ok_or(NoTable::Size { states, sensors })?;
+        with_size(states, sensors, Compiled).ok_or(NoTable::Size { states, sensors })?;
         Ok(values)
     }
 
@@ -193,16 +193,26 @@ impl TableValues {
     /// # Panics
     /// If `NX` and `NY` are not the table's numbers of states and sensors.
     pub fn table<const NX: usize, const NY: usize>(&self) -> GainTable<NX, NY> {
-        assert_eq!((self.states(), self.sensors()), (NX, NY), "states and sensors of the table");
+        assert_eq!(self.states(), NX, "states of the table");
+        self.padded()
+    }
+
+    /// As [`table`](Self::table), with room for more states than the table has: those stay 0, so that the others are
+    /// the same to the bit (up to the sign of a 0).
+    ///
+    /// # Panics
+    /// If `NX` is too small, or `NY` is not the table's number of sensors.
+    pub fn padded<const NX: usize, const NY: usize>(&self) -> GainTable<NX, NY> {
+        assert!(self.states() <= NX && self.sensors() == NY, "states and sensors of the table");
         let mut table: GainTable<NX, NY> = self.widest.resized();
+        table.states = NX as u32;
         table.crc = table.checksum();
         table
     }
 
     /// Names, documentation and values of all fields.
     pub(super) fn fields(&self) -> Vec<contents::Field> {
-        // `of` makes table values only for compiled sizes.
-        with_size(self.states(), self.sensors(), Fields(self)).unwrap_or_default()
+        contents::in_use(&self.widest, self.states(), self.sensors())
     }
 
     /// Names, documentation and values of all fields of the swing-up, and its checksum, if there is one.
@@ -213,8 +223,12 @@ impl TableValues {
 
     /// The checksum the firmware expects.
     pub fn crc(&self) -> u32 {
-        // `of` makes table values only for compiled sizes.
-        with_size(self.states(), self.sensors(), Checksum(self)).unwrap_or(0)
+        contents::checksum(&self.fields())
+    }
+
+    /// Bytes of its values.
+    pub fn bytes(&self) -> usize {
+        contents::bytes(&self.fields())
     }
 
     /// The checksum the firmware expects of its swing-up, if there is one.
@@ -223,24 +237,13 @@ impl TableValues {
     }
 }
 
-struct Checksum<'a>(&'a TableValues);
+/// Whether a size is compiled at all.
+struct Compiled;
 
-impl WithSize for Checksum<'_> {
-    type Output = u32;
+impl WithSize for Compiled {
+    type Output = ();
 
-    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> u32 {
-        self.0.table::<NX, NY>().crc
-    }
-}
-
-struct Fields<'a>(&'a TableValues);
-
-impl WithSize for Fields<'_> {
-    type Output = Vec<contents::Field>;
-
-    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> Self::Output {
-        contents::fields(&self.0.table::<NX, NY>())
-    }
+    fn run<const NX: usize, const NY: usize, const N: usize>(self) {}
 }
 
 struct SwingUpFields<'a>(&'a SwingUpValues);

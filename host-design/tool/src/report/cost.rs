@@ -1,9 +1,7 @@
 //! Operations and memory of the controller, counted.
 
-use upright::table::GainTable;
-
 use super::number::number;
-use upright_design::table::{LawValues, TableValues, WithSize, with_size};
+use upright_design::table::{LawValues, TableValues};
 
 /// Counts, not measurements: operations of the firmware's equations on `f32`, and bytes of constants.
 pub(super) struct LawCost {
@@ -13,8 +11,8 @@ pub(super) struct LawCost {
     pub(super) in_observer: usize,
     /// Multiplications and additions of `f32`; comparisons, as in limits, are not counted.
     pub(super) operations: usize,
-    /// Bytes of the table in flash; none if no firmware has types of this size.
-    table_bytes: Option<usize>,
+    /// Bytes of the table's values in flash.
+    table_bytes: usize,
     /// Ticks per second.
     rate_hz: f64,
 }
@@ -45,7 +43,7 @@ impl LawCost {
             multiply_adds,
             in_observer: if table.observer.is_some() { observer.multiplications } else { 0 },
             operations: multiply_adds + used.iter().map(|part| part.additions).sum::<usize>(),
-            table_bytes: with_size(states, sensors, Bytes),
+            table_bytes: table.bytes(),
             rate_hz: 1.0 / f64::from(table.tick_s),
         }
     }
@@ -57,21 +55,11 @@ impl LawCost {
 
     /// Bytes of the table, as text.
     pub(super) fn bytes(&self) -> String {
-        self.table_bytes.map_or("no table of this size".to_owned(), |bytes| format!("{bytes} bytes"))
+        format!("{} bytes", self.table_bytes)
     }
 }
 
 struct Operations {
     multiplications: usize,
     additions: usize,
-}
-
-struct Bytes;
-
-impl WithSize for Bytes {
-    type Output = usize;
-
-    fn run<const NX: usize, const NY: usize, const N: usize>(self) -> usize {
-        size_of::<GainTable<NX, NY>>()
-    }
 }
