@@ -44,7 +44,7 @@ use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::protocol::telemetry_ticks;
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::calibration::Calibration;
-use crate::supervision::debounce::Debounce;
+use crate::supervision::debounce::{Debounce, OVERRUNS};
 use crate::supervision::detection::Detection;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::WrongTravel;
@@ -98,6 +98,8 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     applied_n: f32,
     cycles: u32,
     worst_cycles: u32,
+    /// Ticks in a row that were late, whether the motor is on or off.
+    late_ticks: u32,
     statistics: Statistics,
     start: Start,
     /// Telemetry is sent every n ticks; 0: never.
@@ -179,6 +181,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             cycles: 0,
             worst_cycles: 0,
             statistics: Statistics::default(),
+            late_ticks: 0,
             start,
             telemetry_period_ticks: telemetry_ticks(table.tick_s),
             ticks_to_telemetry: 0,
@@ -205,6 +208,12 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     /// The controller, read-only.
+    /// Whether so many ticks in a row were late, by [`Contacts::overrun`], that the watchdog must not be fed.
+    #[inline]
+    pub(crate) fn is_late(&self) -> bool {
+        self.late_ticks >= OVERRUNS
+    }
+
     pub fn controller(&self) -> &Controller<'t, NX, NY> {
         &self.controller
     }
@@ -337,6 +346,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.worst_cycles = self.worst_cycles.max(cycles);
         let telemetry = self.telemetry_is_due().then(|| self.telemetry());
+        self.late_ticks = if self.contacts.overrun { self.late_ticks.saturating_add(1) } else { 0 };
         self.count_to_telemetry();
         telemetry
     }

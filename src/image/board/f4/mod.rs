@@ -53,8 +53,6 @@ pub(crate) struct F4Board {
     clock_fault: bool,
     wrong_chip: bool,
     overrun: bool,
-    /// Number of ticks in a row that ended after the next one was due.
-    late_ticks: u8,
     /// Whether the limit switches were open at the end of the previous tick.
     limits: [bool; 2],
 }
@@ -96,7 +94,6 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
         overrun: false,
-        late_ticks: 0,
         limits: [false; 2],
     };
     (hardware, line, Start { reset, crash, image: memory::image_checksum() })
@@ -171,15 +168,9 @@ impl Board<SENSORS> for F4Board {
         }
     }
 
-    /// Does not feed the watchdog after three late ticks in a row, which are a fault. (If it is not fed, the fastest
-    /// watchdog waits for two ticks.)
-    fn feed_watchdog(&mut self) {
+    fn end_tick(&mut self) {
         self.limits = pins::limits();
         self.overrun = tick_is_due();
-        self.late_ticks = if self.overrun { self.late_ticks.saturating_add(1) } else { 0 };
-        if self.late_ticks < 3 {
-            self.watchdog.feed();
-        }
         pins::show_tick(false);
     }
 
