@@ -22,8 +22,9 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
 use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::{CounterWidth, is_at_end};
-use upright::gains::SENSORS;
+use upright::gains::{SENSORS, STATES};
 use upright::protocol::message::Start;
+use upright::table::GainTable;
 
 use angles::Angles;
 pub(crate) use clock::CLOCK_HZ;
@@ -58,8 +59,12 @@ pub(crate) struct F4Board {
 }
 
 /// Sets up all peripherals but the watchdog, with the motor off. Takes at most 300 ms, even if a peripheral does not
-/// respond. Also returns what the board knows about the start.
-pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4Board, DmaLine, Start) {
+/// respond. Also returns the check of memory, and what the board knows about the start.
+pub(crate) fn set_up(
+    device: Peripherals,
+    buffer: &'static mut DmaBuffer,
+    table: &'static GainTable<STATES, SENSORS>,
+) -> (F4Board, DmaLine, MemoryCheck, Start) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
@@ -96,7 +101,11 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
         overrun: false,
         limits: [false; 2],
     };
-    (hardware, line, Start { reset, crash, image: memory::image_checksum() })
+    // In this order: what changes in between is found by the check.
+    let memory = MemoryCheck::new(table);
+    let mut start = Start { reset, crash, ..Start::default() };
+    start.compare_image(memory::image());
+    (hardware, line, memory, start)
 }
 
 impl F4Board {
@@ -172,6 +181,10 @@ impl Board<SENSORS> for F4Board {
         self.limits = pins::limits();
         self.overrun = tick_is_due();
         pins::show_tick(false);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
     }
 
     fn cycles(&self) -> u32 {
