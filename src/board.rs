@@ -175,9 +175,13 @@ pub trait Board<const NY: usize> {
     /// that is enabled without pulses holds the cart.
     fn drive(&mut self, output: &Output);
 
-    /// Called at the end of a tick. Restarts the independent watchdog, but not if this is the third tick in a row that
-    /// has ended after the next one was due. If the watchdog is not restarted in time, it resets the microcontroller,
-    /// which turns the motor off.
+    /// Called at the end of every tick: the time to note what the next [`inputs`](Self::inputs) report, such as whether
+    /// the next tick is already due. By default, it does nothing.
+    fn end_tick(&mut self) {}
+
+    /// Restarts the independent watchdog. The control task calls this after [`end_tick`](Self::end_tick), but not while
+    /// three ticks in a row were late, by [`Contacts::overrun`]. If the watchdog is not restarted in time, it resets
+    /// the microcontroller, which turns the motor off.
     fn feed_watchdog(&mut self);
 
     /// A free-running counter of processor cycles.

@@ -13,6 +13,7 @@
 //! | [`supervision`] | states, faults, what prevents arming, homing, sign check, limits, fault detection |
 //! | [`protocol`] | messages, frames, the serial link |
 //! | [`board`] | the trait that a board implements: inputs of a tick, output to the motor |
+//! | [`flash_image`] | the checksum that an image in flash carries |
 //! | [`firmware`] | one tick of all of the above, and the control task that a timer starts |
 //!
 //! The whole firmware, as a control task runs it: the motor stays off until nothing prevents arming any more.
@@ -69,6 +70,8 @@ pub mod board;
 pub mod control;
 #[cfg(feature = "firmware")]
 pub mod firmware;
+#[cfg(feature = "firmware")]
+pub mod flash_image;
 #[cfg(not(feature = "gains-from-env"))]
 pub mod gains;
 #[cfg(feature = "gains-from-env")]

@@ -77,7 +77,10 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         if let Some(log) = log {
             self.send(Message::Log(log));
         }
-        self.board.feed_watchdog();
+        self.board.end_tick();
+        if !self.firmware.is_late() {
+            self.board.feed_watchdog();
+        }
         self.cycles = self.board.cycles().wrapping_sub(begin);
     }
 
@@ -99,3 +102,6 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         &mut self.board
     }
 }
+
+#[cfg(test)]
+mod tests;

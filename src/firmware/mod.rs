@@ -44,7 +44,7 @@ use crate::protocol::message::{Command, Reply, Start, Statistics, Telemetry};
 use crate::protocol::telemetry_ticks;
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::calibration::Calibration;
-use crate::supervision::debounce::Debounce;
+use crate::supervision::debounce::{Debounce, OVERRUNS};
 use crate::supervision::detection::Detection;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::WrongTravel;
@@ -71,7 +71,7 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     swing_up_scan: ChecksumScan<'t>,
     /// See [`Board::CHECKS_TABLES`](crate::board::Board::CHECKS_TABLES).
     board_checks_tables: bool,
-    /// Whether the table was sound at the start.
+    /// Whether table and image were sound at the start.
     is_usable: bool,
     /// Whether the whole table has been found intact since arming.
     is_checked: bool,
@@ -98,6 +98,8 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     applied_n: f32,
     cycles: u32,
     worst_cycles: u32,
+    /// Ticks in a row that were late, whether the motor is on or off.
+    late_ticks: u32,
     statistics: Statistics,
     start: Start,
     /// Telemetry is sent every n ticks; 0: never.
@@ -128,7 +130,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// [`Reset`](crate::protocol::message::Reset). Without swing-up, `swing_up` is [`NoSwingUp`].
     ///
     /// There is a firmware for every table: if one is damaged, [`Fault::Table`] is latched, cannot be cleared, and is
-    /// reported to the host. To know before, call [`GainTable::check`] and [`SwingUp::check`].
+    /// reported to the host. So is [`Fault::Image`] of a damaged image. To know before, call [`GainTable::check`] and
+    /// [`SwingUp::check`].
     // Returns no `Result`, which would put a copy of the firmware on the stack.
     #[inline(never)]
     pub fn new(
@@ -140,13 +143,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let start = start.into();
         let are_sound = swing_up.check(table).is_ok() && table.check().is_ok();
         let (controller, is_usable) = match Controller::with_checked(table, widths) {
-            Ok(controller) if are_sound => (controller, true),
+            Ok(controller) if are_sound => (controller, !start.is_damaged),
             _ => (Controller::unusable(table, widths), false),
         };
         let at_start = |fault| Cause { fault, tick: 0, sensor: None };
         let mut supervisor = Supervisor::new(start.reset.fault().map(at_start));
         if !is_usable {
-            supervisor.trip(at_start(Fault::Table));
+            supervisor.trip(at_start(if start.is_damaged { Fault::Image } else { Fault::Table }));
         }
         // The new firmware is not changed after this expression: that would make a copy, which needs a quarter of the
         // board's stack.
@@ -178,6 +181,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             applied_n: 0.0,
             cycles: 0,
             worst_cycles: 0,
+            late_ticks: 0,
             statistics: Statistics::default(),
             start,
             telemetry_period_ticks: telemetry_ticks(table.tick_s),
@@ -202,6 +206,12 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             (self.timer_tick_s, self.is_usable) = (timer_tick_s, false);
             self.trip(Fault::Table, None);
         }
+    }
+
+    /// Whether so many ticks in a row were late, by [`Contacts::overrun`], that the watchdog must not be fed.
+    #[inline]
+    pub(crate) fn is_late(&self) -> bool {
+        self.late_ticks >= OVERRUNS
     }
 
     /// The controller, read-only.
@@ -336,6 +346,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.cycles = cycles;
         self.statistics.ticks = self.statistics.ticks.wrapping_add(1);
         self.worst_cycles = self.worst_cycles.max(cycles);
+        self.late_ticks = if self.contacts.overrun { self.late_ticks.saturating_add(1) } else { 0 };
         let telemetry = self.telemetry_is_due().then(|| self.telemetry());
         self.count_to_telemetry();
         telemetry

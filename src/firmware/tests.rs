@@ -334,6 +334,24 @@ impl<const PULSES: bool> Board<SENSORS> for Timed<PULSES> {
     }
 }
 
+#[test]
+fn a_damaged_image_never_arms_and_says_so() {
+    let mut image = [7; 64];
+    image[32..36].copy_from_slice(&crate::flash_image::checksum(&[7; 64]).to_le_bytes());
+    let mut start = Start::from(Reset::Power);
+    start.compare_image(&image);
+    assert!(!start.is_damaged && start.image != 0);
+    let of = |start| Firmware::new(&TABLE, &NoSwingUp, [CounterWidth::Bits32; SENSORS], start);
+    assert_eq!(of(start).state(), State::Disarmed);
+    image[63] ^= 1;
+    start.compare_image(&image);
+    let mut firmware = of(start);
+    assert_eq!((firmware.state(), firmware.supervisor.fault()), (State::Fault, Some(Fault::Image)));
+    firmware.control(&INPUTS);
+    let (_, reply) = firmware.finish(Some(&Command { id: 1, request: Request::Clear }), 0);
+    assert_eq!(reply.map(|reply| reply.answer), Some(Answer::NotNow(Inhibits::TABLE)));
+}
+
 /// The latched fault after Clear, and the tick that the firmware reports, on a board with this tick.
 fn on_a_board_with(tick_s: f32) -> (Option<Fault>, f32) {
     on_board::<false>(&TABLE, tick_s)

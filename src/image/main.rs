@@ -62,10 +62,9 @@ mod app {
     ])]
     fn init(cx: init::Context) -> (Shared, TaskState) {
         let table = &*cx.local.table;
-        let (hardware, line, start) = set_up(cx.device, cx.local.buffer);
+        let (hardware, line, memory, start) = set_up(cx.device, cx.local.buffer, table);
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
-        let memory = MemoryCheck::new(table, start.image);
         let firmware = Firmware::new(table, &SWING_UP, Hardware::WIDTHS, start);
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();

@@ -6,8 +6,8 @@ use crate::board::{Contacts, Inputs};
 use crate::supervision::fault::Fault;
 use crate::table::Limits;
 
-/// This many overruns in a row are a fault.
-const OVERRUNS: u32 = 3;
+/// This many overruns in a row are a fault, and the watchdog is no longer fed.
+pub(crate) const OVERRUNS: u32 = 3;
 /// This many measurements of too high a supply in a row are a fault: one may be a spike beside a switching bridge.
 const OVER_VOLTAGES: u32 = 3;
 

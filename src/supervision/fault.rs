@@ -52,6 +52,8 @@ pub enum Fault {
     TrackingError = 20,
     /// The measurements are further from the model than after any push that the rig survives.
     Disturbed = 21,
+    /// The code in flash is not as it was linked.
+    Image = 22,
 }
 
 /// Longest time from a fault's first effect on the firmware's inputs to motor off.
@@ -92,7 +94,7 @@ pub struct Entry {
 
 impl Fault {
     /// Every fault, by code.
-    pub const ALL: [Entry; 21] = [
+    pub const ALL: [Entry; 22] = [
         Entry {
             fault: Fault::NotFinite,
             name: "not finite",
@@ -259,6 +261,14 @@ impl Fault {
             reaction: Reaction::Ticks(3),
             remedy: "let the links hang, then raise them again; if nobody pushed, check encoders and motor",
         },
+        Entry {
+            fault: Fault::Image,
+            name: "image",
+            condition: "at the start, the code in flash is not as it was linked: it has been damaged, or the image was not \
+                        made by `upright firmware build`",
+            reaction: Reaction::Hardware("the motor never comes on"),
+            remedy: "flash the firmware again; if it comes again, the memory is damaged",
+        },
     ];
 
     /// Which fault is latched when several occur in one tick: the first of these. Inputs come first, then the limits
@@ -267,7 +277,7 @@ impl Fault {
     /// [`Fault::NotFinite`] is listed once but has two checks: that of the supply voltage comes after the limit
     /// switches, that of the requested force after the overrun. A [`Fault::Motor`] found by rejected measurements of
     /// several sensors has the place of [`Fault::Encoder`]. [`Fault::Watchdog`] and [`Fault::Crash`] reset the
-    /// microcontroller.
+    /// microcontroller, and [`Fault::Image`] is found before the first tick.
     pub const PRECEDENCE: [Fault; 19] = [
         Fault::Clock,
         Fault::Board,

@@ -34,7 +34,7 @@ inhibits! {
     10 SUPPLY "the supply is too low or too high";
     11 HELD "the key was held since the motor went off: let go, then try again";
     12 NO_OBSERVER "the gain table holds no observer: give the rig its encoders and `[kalman]`";
-    13 TABLE "the gain table does not fit its checksum or this build";
+    13 TABLE "the gain table or the image does not fit its checksum, or the table does not fit this build";
     14 NOT_HANGING "the links do not hang at rest";
     15 NO_SWITCHES "this rig has no rail with switches at its ends";
     16 NO_SWING_UP "the gain table holds no swing-up: give the rig file `[swing_up]`";

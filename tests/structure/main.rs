@@ -4,6 +4,7 @@
 mod circles;
 mod documents;
 mod source;
+mod waits;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

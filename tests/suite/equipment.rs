@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source};
+use upright_test_support::limits::output;
 use upright_test_support::repository;
 use upright_tool::image::{BuildError, Compiler, ImageKind, PROFILE, TARGET, build, build_for, compiler};
 
@@ -33,7 +34,7 @@ pub(crate) fn build_crate(name: &str, rig: &Rig, table: &TableValues) -> Result<
     std::fs::write(&gains, gains_source(rig, table)).unwrap();
     cargo.current_dir(repository().join("boards").join(name)).env("UPRIGHT_GAINS", gains);
     cargo.args(["build", "--quiet", "--locked", "--profile", PROFILE, "--target", TARGET]);
-    let output = cargo.output().unwrap();
+    let output = output(&mut cargo);
     if output.status.success() {
         return Ok(target_directory.join(TARGET).join(PROFILE));
     }
@@ -45,7 +46,7 @@ mod tests {
     use std::process::Command;
     use std::time::Duration;
 
-    use upright_test_support::equipment::output_within;
+    use upright_test_support::limits::output_within;
 
     #[test]
     fn a_program_that_ends_in_time_gives_what_it_prints() {
@@ -55,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "takes more than 100ms")]
+    #[should_panic(expected = "after 100ms, this has not come: the end of \"sleep\" \"60\"")]
     fn a_program_that_does_not_end_is_ended() {
         output_within(Command::new("sleep").arg("60"), Duration::from_millis(100));
     }

@@ -10,6 +10,7 @@ use crate::equipment::if_possible;
 use crate::published::table;
 use upright_design::rig::Rig;
 use upright_design::table::gains_source;
+use upright_test_support::limits::output;
 use upright_test_support::repository;
 use upright_tool::image::{Compiler, PROFILE, TARGET, compiler};
 
@@ -104,7 +105,7 @@ fn foreign_crate() -> PathBuf {
 }
 
 fn run(command: &mut Command) -> String {
-    let output = command.output().unwrap();
+    let output = output(command);
     let (said, complained) =
         (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{command:?}\n{said}{complained}");
@@ -143,7 +144,7 @@ fn a_crate_made_from_the_document_balances_on_the_host() {
     let other = tempfile::tempdir().unwrap();
     let rig = std::fs::read_to_string(folder.join("rig.toml")).unwrap();
     std::fs::write(other.path().join("rig.toml"), rig.replace("mass_kg = 0.2", "mass_kg = 0.3")).unwrap();
-    assert!(!host(other.path()).output().unwrap().status.success());
+    assert!(!output(&mut host(other.path())).status.success());
 }
 
 fn target_of_the_tests() -> &'static Path {

@@ -49,7 +49,7 @@ const uint8_t *upright_transmit(uint32_t *length);
 /* What the program gives; `upright_start` and `upright_tick` call it. None may wait. */
 void upright_board_inputs(upright_inputs *inputs);
 void upright_board_drive(const upright_output *output);
-/* At the end of a tick: restart the watchdog, but not if this is the third late tick in a row. */
+/* Restart the watchdog. Called at the end of a tick, but not while `overrun` was set in three ticks in a row. */
 void upright_board_feed_watchdog(void);
 /* A counter of processor cycles; 0 if there is none. */
 uint32_t upright_board_cycles(void);

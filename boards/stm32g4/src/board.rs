@@ -33,8 +33,8 @@ pub(crate) struct Hardware {
     pub(crate) watchdog: IndependentWatchdog<'static, IWDG>,
     /// When the next tick is due.
     pub(crate) next_tick: Instant,
-    /// Number of ticks in a row that ended after the next one was due.
-    pub(crate) late_ticks: u8,
+    /// Whether the last tick ended after the next one was due.
+    pub(crate) is_late: bool,
 }
 
 /// Lines of the chip that note edges: the emergency stop at PB2 opens, the power stage at PB10 reports a fault.
@@ -80,7 +80,7 @@ impl Board<SENSORS> for Hardware {
                 limit_high: self.limit_high.is_high(),
                 emergency_stop: was_noted(STOPPED) | self.emergency_stop.is_high(),
                 driver_fault: was_noted(FAULTY) | self.driver_fault.is_low(),
-                overrun: self.late_ticks > 0,
+                overrun: self.is_late,
                 clock_fault: false,
                 board_fault: false,
             },
@@ -97,13 +97,12 @@ impl Board<SENSORS> for Hardware {
         self.pwm.set_duty_cycle((output.duty.abs() * self.pwm.max_duty_cycle() as f32) as u32);
     }
 
-    /// Does not feed the watchdog after three late ticks in a row, which are a fault.
+    fn end_tick(&mut self) {
+        self.is_late = Instant::now() >= self.next_tick;
+    }
+
     fn feed_watchdog(&mut self) {
-        let is_late = Instant::now() >= self.next_tick;
-        self.late_ticks = if is_late { self.late_ticks.saturating_add(1) } else { 0 };
-        if self.late_ticks < 3 {
-            self.watchdog.pet();
-        }
+        self.watchdog.pet();
     }
 
     fn cycles(&self) -> u32 {

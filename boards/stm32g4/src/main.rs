@@ -124,7 +124,7 @@ fn set_up(chip: Peripherals) -> (Hardware, BufferedUart<'static>) {
         // Three ticks, and a quarter for the inaccuracy of its clock.
         watchdog: IndependentWatchdog::new(chip.IWDG, TICK.as_micros() as u32 * 15 / 4),
         next_tick: Instant::now(),
-        late_ticks: 0,
+        is_late: false,
     };
     board::note_edges();
     // The ST-Link's serial port.

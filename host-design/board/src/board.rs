@@ -14,6 +14,7 @@ use crate::peripherals::gpio::ExternalLevel;
 use crate::peripherals::power::{BrownOut, POWER_DOWN_V};
 use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG, SOFTWARE_FLAG};
 use crate::peripherals::usart::LineByte;
+use crate::timing::CoreTiming;
 use crate::wiring::{BoardWiring, Pin};
 
 /// Size of the reserved space below the SRAM that the firmware's MPU region covers.
@@ -156,6 +157,7 @@ impl Conditions {
             seed,
             chip_v: 3.3,
             brown_out: BrownOut::Off,
+            timing: CoreTiming::Quick,
             is_calibrated: true,
         }
     }

@@ -37,7 +37,8 @@
 //! and the effect on the core of a supply too low for its clock are not modelled either.
 //!
 //! # What is approximate
-//! Cycle counts: they follow ARM's table, with a direct-mapped model of the flash accelerator. DWT_CYCCNT also counts
+//! Cycle counts: they follow ARM's table, with a direct-mapped model of the flash accelerator, in one of two ways
+//! ([`CoreTiming`]). DWT_CYCCNT also counts
 //! during WFI. Everything else is exact for given inputs at given times: every value, every flag, every exception.
 
 #![forbid(unsafe_code)]
@@ -59,6 +60,7 @@ mod meter;
 mod peripherals;
 mod processor;
 pub mod single_step;
+mod timing;
 mod wiring;
 
 pub use angle_sensor::SensorDefect;
@@ -76,4 +78,5 @@ pub use peripherals::gpio::ExternalLevel;
 pub use peripherals::power::BrownOut;
 pub use peripherals::rcc::Crystal;
 pub use peripherals::usart::LineByte;
+pub use timing::CoreTiming;
 pub use wiring::{BoardWiring, Pin, pin};

@@ -6,8 +6,10 @@ use crate::decode::{Undecodable, decode, is_wide};
 use crate::error::{ProcessorFault, Trap, Violation};
 use crate::instruction::{Instruction, Op, Unit};
 use crate::processor::mpu::Purpose;
+use crate::processor::pipeline::Pipeline;
 use crate::processor::registers::Registers;
 use crate::processor::watch::Watch;
+use crate::timing::CoreTiming;
 
 pub(crate) const FLASH: u32 = 0x0800_0000;
 
@@ -22,8 +24,9 @@ pub(crate) struct Microcontroller {
     pub(crate) next: u32,
     pub(crate) cycles: u32,
     pub(crate) in_it: bool,
-    /// The previous instruction was a load.
+    /// The previous instruction was a load with which the next one overlaps.
     pub(crate) loaded: bool,
+    pub(crate) pipeline: Pipeline,
     pub(crate) asleep: bool,
     pub(crate) locked_up: bool,
     /// The core is stalled until this time; peripherals keep running.
@@ -54,6 +57,7 @@ impl Microcontroller {
             cycles: 0,
             in_it: false,
             loaded: false,
+            pipeline: Pipeline::default(),
             asleep: false,
             locked_up: false,
             stalled_until: 0,
@@ -158,6 +162,12 @@ impl Microcontroller {
         let registers = &self.registers;
         let suspended = registers.faultmask || matches!(registers.ipsr, 2 | 3);
         self.bus.system.mpu.allows(address, purpose, registers.privileged(), suspended)
+    }
+
+    /// Whether the next load overlaps with one that has itself, or not, overlapped with the one before.
+    #[inline]
+    pub(crate) fn may_overlap(&self, has_overlapped: bool) -> bool {
+        !has_overlapped || self.bus.timing == CoreTiming::Quick
     }
 
     /// Loads from memory or a register, extended to 32 bits.

@@ -1,10 +1,10 @@
 //! The board of this image: the only code that accesses registers, and the only code with `unsafe`.
 //!
 //! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
-//! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes;
-//! `start_ticks` starts the interrupt of the control task, and `sleep` waits for an interrupt; a `MemoryCheck` finds
-//! memory that has changed; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock, `TICK_US` the range of
-//! ticks.
+//! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes,
+//! and a [`MemoryCheck`] that finds memory that has changed; `start_ticks` starts the interrupt of the control task,
+//! and `sleep` waits for an interrupt; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock, `TICK_US` the
+//! range of ticks.
 
 #![allow(unsafe_code)]
 

@@ -9,6 +9,7 @@ use crate::published::rig_and_table;
 use upright::table::Law;
 use upright_design::export::c_header;
 use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::limits::output;
 
 /// A machine of QEMU, and the compiler's flags for its processor. With the last one, gcc fuses products into sums
 /// wherever a header does not forbid it.
@@ -39,7 +40,7 @@ const MACHINES: [Machine; 4] = [
 /// Whether compiler and emulator can be started.
 pub(crate) fn can_run() -> bool {
     let has_library = || {
-        let file = Command::new("arm-none-eabi-gcc").arg("-print-file-name=rdimon.specs").output().unwrap();
+        let file = output(Command::new("arm-none-eabi-gcc").arg("-print-file-name=rdimon.specs"));
         let is_there = String::from_utf8_lossy(&file.stdout).contains('/');
         assert!(is_there || !is_required("UPRIGHT_REQUIRE_GCC"), "install libnewlib-arm-none-eabi");
         if !is_there {

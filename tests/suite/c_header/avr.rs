@@ -13,6 +13,7 @@ use upright_design::export::c_header;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::limits::output;
 use upright_test_support::repository;
 
 const UNO: Dialect<'_> =
@@ -26,12 +27,11 @@ fn in_simavr(header: &str, recording: &str) -> [u32; 4] {
 /// The four numbers that this program has sent.
 fn sent_by(program: &Program, recording: &str) -> [u32; 4] {
     program.add("recording.h", recording);
-    let output = program.compiled(UNO);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let compiled = program.compiled(UNO);
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
     let run = ["-m", "atmega328p", "-f", "16000000"];
     let mut simavr = Command::new("simavr");
-    let output =
-        simavr.current_dir(program.path().parent().unwrap()).args(run).arg(program.path()).output().unwrap();
+    let output = output(simavr.current_dir(program.path().parent().unwrap()).args(run).arg(program.path()));
     let said =
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     // Numbers among the simulator's own words and colours.
@@ -223,7 +223,7 @@ fn sketch(text: &str, header: &str) -> (String, bool) {
         ]);
         gcc.args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DARDUINO=10807", "-ffunction-sections"]);
         gcc.args([format!("-I{core}"), format!("-I{ARDUINO_AVR}/variants/standard")]);
-        let output = gcc.args(arguments.split(' ')).output().unwrap();
+        let output = output(gcc.args(arguments.split(' ')));
         (String::from_utf8_lossy(&output.stderr).into_owned(), output.status.success())
     };
     let compiled = run("-Wall -Wextra -Werror -c sketch.cpp -o sketch.o");

@@ -7,6 +7,7 @@ use std::process::{Command, Output, Stdio};
 use super::recorded::ControllerTick;
 use tempfile::TempDir;
 use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::limits::{PATIENCE, joined, output, output_of};
 
 /// The program that replays recorded ticks.
 pub(crate) const REPLAY: &str = include_str!("replay.c");
@@ -58,7 +59,7 @@ impl Program {
     /// Compiles it; the compiler's output.
     pub(crate) fn compiled(&self, Dialect { compiler, flags }: Dialect<'_>) -> Output {
         let source = self.folder.path().join("program.c");
-        Command::new(compiler).args(flags).arg(source).arg("-o").arg(self.path()).output().unwrap()
+        output(Command::new(compiler).args(flags).arg(source).arg("-o").arg(self.path()))
     }
 
     /// The program that replays recorded ticks, compiled in this way.
@@ -80,8 +81,8 @@ impl Program {
         let bytes: Vec<u8> = input.iter().flatten().flat_map(|word| word.to_ne_bytes()).collect();
         let mut stdin = child.stdin.take().unwrap();
         let writer = std::thread::spawn(move || stdin.write_all(&bytes));
-        let output = child.wait_with_output().unwrap();
-        writer.join().unwrap().unwrap();
+        let output = output_of(child, "the program that replays", PATIENCE);
+        joined(writer, "the program reads its input").unwrap();
         let words: Vec<u32> =
             output.stdout.chunks_exact(4).map(|word| u32::from_ne_bytes(word.try_into().unwrap())).collect();
         let ticks = words.chunks_exact(words.len() / input.len());

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use crate::c_header::can_run_on_cortex_m;
 use crate::equipment::{build_crate, if_possible};
@@ -16,7 +15,7 @@ use upright_design::harness::Pins;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_test_support::equipment::output_within;
+use upright_test_support::limits::output;
 use upright_test_support::repository;
 
 fn folder() -> PathBuf {
@@ -34,7 +33,7 @@ fn link(library: &Path, sensors: usize, tick_s: f64, program: &Path) {
     gcc.arg(tests.join("c_header/cortex_m.c")).arg("-T").arg(tests.join("c_library/memory.ld"));
     // The library has more of Rust's functions than the program needs.
     gcc.arg(library).arg("-Wl,--gc-sections").arg("-o").arg(program);
-    let output = gcc.output().unwrap();
+    let output = output(&mut gcc);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
@@ -78,9 +77,6 @@ struct Answer {
     sent: Vec<u8>,
 }
 
-/// A run takes a second or two.
-const LONGEST: Duration = Duration::from_secs(60);
-
 /// Runs the program in QEMU; its exit status, and what it has written.
 fn run(program: &Path, wires: &[u8]) -> (Option<i32>, Vec<Answer>) {
     let folder = program.parent().unwrap();
@@ -88,7 +84,7 @@ fn run(program: &Path, wires: &[u8]) -> (Option<i32>, Vec<Answer>) {
     let mut qemu = Command::new("qemu-system-arm");
     qemu.args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-kernel"]);
     qemu.arg(program).args(["-semihosting-config", "enable=on,target=native"]);
-    let status = output_within(qemu.current_dir(folder), LONGEST).status.code();
+    let status = output(qemu.current_dir(folder)).status.code();
     let bytes = std::fs::read(folder.join("wires.out")).unwrap_or_default();
     let (mut rest, mut answers) = (bytes.as_slice(), Vec::new());
     while let Some((head, after)) = rest.split_at_checked(14) {

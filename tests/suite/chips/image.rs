@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use super::recorded::Replay;
 use crate::published::rig_and_table_with_motions;
 use upright_design::table::gains_source;
-use upright_test_support::equipment::output_within;
+use upright_test_support::limits::output;
 use upright_test_support::repository;
 use upright_tool::image::{BuildError, Compiler, PROFILE, compiler_for_chips};
 
@@ -22,9 +21,6 @@ pub(super) struct Machine {
     /// Nanoseconds per count of the image's clock. An instruction takes [`INSTRUCTION_NS`].
     clock_ns: f64,
 }
-
-/// Longest time for a run, which takes some seconds.
-const LONGEST: Duration = Duration::from_secs(300);
 
 /// One instruction takes 2⁶ ns of the emulator's time.
 const INSTRUCTION_NS: f64 = 64.0;
@@ -105,7 +101,7 @@ fn compile(subcommand: &str, machines: &[&Machine], arguments: &[&str]) -> Resul
     cargo.current_dir(std::env::temp_dir()).args([subcommand, "--quiet", "--locked", "--profile", PROFILE]);
     cargo.arg("--manifest-path").arg(repository().join("boards/replay/Cargo.toml"));
     cargo.args(targets.iter().flat_map(|target| ["--target", target])).args(arguments);
-    let output = cargo.output().unwrap();
+    let output = output(&mut cargo);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Ok(target_directory)
 }
@@ -139,7 +135,7 @@ impl Image {
         qemu.args(["-M", self.machine.name, "-nographic", "-monitor", "none", "-serial", "none"]);
         qemu.args(self.machine.options).args(["-icount", "shift=6,sleep=off"]);
         qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(&self.path);
-        let output = output_within(qemu.current_dir(folder.path()), LONGEST);
+        let output = output(qemu.current_dir(folder.path()));
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{} on {}: {said}", replay.name, self.machine.target);
         self.replayed(std::fs::read(file("replay.out")).unwrap())

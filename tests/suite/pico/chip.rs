@@ -1,8 +1,8 @@
 //! The emulated chip: `boards/rp2040/harness/replay.mjs`.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 
@@ -11,6 +11,7 @@ use crate::equipment::if_possible;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::limits::{Lines, Running};
 use upright_test_support::repository;
 use upright_tool::image::{PicoBoard, build_pico};
 
@@ -43,8 +44,8 @@ pub(super) struct Train {
 
 /// The emulator with an image.
 pub(super) struct Chip {
-    process: Child,
-    answers: BufReader<ChildStdout>,
+    process: Running,
+    answers: Lines,
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {
@@ -70,16 +71,15 @@ impl Chip {
     pub(super) fn start(uf2: &Path, encoders: usize) -> Self {
         let mut node = Command::new("node");
         node.current_dir(harness()).arg("replay.mjs").arg(uf2).arg(encoders.to_string());
-        let mut process = node.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-        let answers = BufReader::new(process.stdout.take().unwrap());
+        let mut process = Running(node.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap());
+        let answers = Lines::of(process.stdout.take().unwrap());
         Self { process, answers }
     }
 
     /// Sends a line and takes the answer.
     fn ask(&mut self, line: &Value) -> Value {
         writeln!(self.process.stdin.as_mut().unwrap(), "{line}").unwrap();
-        let mut answer = String::new();
-        self.answers.read_line(&mut answer).unwrap();
+        let answer = self.answers.next("the emulator's answer");
         serde_json::from_str(&answer).unwrap_or_else(|error| panic!("{error}: {answer}"))
     }
 
@@ -190,12 +190,5 @@ fn answer(object: &Value) -> Answer {
         stack: number("stack"),
         sent: bytes(&object["sent"]),
         trains: object["trains"].as_array().unwrap().iter().map(train).collect(),
-    }
-}
-
-impl Drop for Chip {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }

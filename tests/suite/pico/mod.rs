@@ -13,6 +13,7 @@ use crate::chips::recorded::stand_still;
 use crate::equipment::if_possible;
 use crate::published::{rig_and_table, rig_and_table_with_motions};
 use upright::board::Output;
+use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::harness::Pins;
@@ -208,25 +209,34 @@ fn four_links_are_raised_at_1_khz() {
 
 #[test]
 #[ignore = "runs an emulator of the chip"]
-fn a_changed_table_keeps_the_motor_off() {
+fn a_table_or_code_that_is_damaged_before_power_comes_keeps_the_motor_off() {
     let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
     let Some(uf2) = uf2_with_motions(rig, table) else { return };
-    let run = recorded(rig, table, &by_hand(rig, 0.1), no_defect());
-    let mut bytes = std::fs::read(&uf2).unwrap();
+    let mut run = recorded(rig, table, &by_hand(rig, 0.1), no_defect());
+    run.truncate(WARM_UP_TICKS + 200);
+    let sound = std::fs::read(&uf2).unwrap();
     let gain = table.laws.lqr.as_ref().unwrap().k[0].to_le_bytes();
-    let at = bytes.windows(4).position(|window| window == gain).unwrap();
-    bytes[at] ^= 1;
-    let folder = tempfile::tempdir().unwrap();
-    let changed = folder.path().join("changed.uf2");
-    std::fs::write(&changed, bytes).unwrap();
-    let mut short = run;
-    short.truncate(WARM_UP_TICKS + 200);
-    let answers = Chip::start(&changed, table.sensors()).replay(&short);
-    let sent: Vec<u8> = answers.iter().flat_map(|answer| answer.sent.iter().copied()).collect();
-    let telemetry = recorded::telemetry(&sent);
-    assert!(!telemetry.is_empty() && answers.iter().all(|answer| !answer.enabled));
-    let table_fault = Some(upright::supervision::fault::Fault::Table);
-    assert!(telemetry.iter().all(|at| at.fault == table_fault), "{:?}", telemetry[0].fault);
+    let gain = sound.windows(4).position(|window| window == gain).unwrap();
+    // The image from power-up on; its faults.
+    let faults = |bytes: &[u8]| {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("changed.uf2");
+        std::fs::write(&file, bytes).unwrap();
+        let answers = Chip::start(&file, table.sensors()).replay(&run);
+        let sent: Vec<u8> = answers.iter().flat_map(|answer| answer.sent.iter().copied()).collect();
+        let telemetry = recorded::telemetry(&sent);
+        assert!(!telemetry.is_empty() && answers.iter().all(|answer| !answer.enabled));
+        telemetry.iter().map(|at| at.fault).collect::<Vec<_>>()
+    };
+    // A gain, and a motion in one of the last pages of 256 bytes, each in a block of 512.
+    for at in [gain, sound.len() - 8 * 512 + 40] {
+        let mut bytes = sound.clone();
+        bytes[at] ^= 1;
+        let found = faults(&bytes);
+        assert!(found.iter().all(|fault| *fault == Some(Fault::Image)), "{at}: {found:?}");
+    }
+    // Negative control.
+    assert!(faults(&sound).iter().all(Option::is_none));
 }
 
 #[test]

@@ -5,8 +5,7 @@
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
 
 /// Says on stderr what a test leaves out, in spite of the test program, which hides what a passing test prints with the
 /// macros.
@@ -36,25 +35,6 @@ pub fn if_possible<T, E: Debug + ToString>(
         }
         result => Some(result.unwrap()),
     }
-}
-
-/// Runs a command that prints little, such as an emulator, and ends it if it takes too long.
-///
-/// # Panics
-/// If it does not start, or takes longer than `limit`.
-pub fn output_within(command: &mut Command, limit: Duration) -> Output {
-    let mut process =
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let begin = Instant::now();
-    while process.try_wait().unwrap().is_none() {
-        if begin.elapsed() > limit {
-            process.kill().unwrap();
-            let output = process.wait_with_output().unwrap();
-            panic!("{command:?} takes more than {limit:?}: {}", String::from_utf8_lossy(&output.stderr));
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    process.wait_with_output().unwrap()
 }
 
 /// The image, if there is one and QEMU is there.

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod equipment;
+pub mod limits;
 pub mod published;
 
 use std::path::PathBuf;

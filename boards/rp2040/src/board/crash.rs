@@ -6,7 +6,6 @@ use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, exception};
 use hal::pac::WATCHDOG;
 use upright::protocol::message::{CrashRecord, Reset, Start};
-use upright::table::checksum::crc32;
 
 /// Mark of a crash that caused the last reset, and of an older one.
 const NEW: u32 = 0x5afe_2040;
@@ -16,6 +15,7 @@ unsafe extern "C" {
     static __sdata: u32;
     static __edata: u32;
     static __sidata: u32;
+    static __vector_table: u32;
 }
 
 /// Why the program started, and the record of the last crash since power-on.
@@ -33,17 +33,19 @@ pub(super) fn start(watchdog: &WATCHDOG) -> Start {
         _ => Reset::Power,
     };
     let crash = matches!(mark, NEW | OLD).then_some(CrashRecord(record));
-    Start { reset, crash, image: image_checksum() }
+    let mut start = Start { reset, crash, ..Start::default() };
+    start.compare_image(image());
+    start
 }
 
-/// CRC-32 of the image in flash.
-fn image_checksum() -> u32 {
-    const FLASH: usize = 0x1000_0000;
+/// The image in flash, from its vector table on: the boot ROM checks what an RP2040 has before it.
+fn image() -> &'static [u8] {
     // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
     unsafe {
         let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
         let end = (&raw const __sidata) as usize + values;
-        crc32(0, core::slice::from_raw_parts(FLASH as *const u8, end - FLASH))
+        let begin = (&raw const __vector_table).cast::<u8>();
+        core::slice::from_raw_parts(begin, end - begin as usize)
     }
 }
 

@@ -57,8 +57,6 @@ pub(crate) struct Hardware {
     /// Ticks of the timer that were over before the tick had ended.
     wraps: u32,
     overrun: bool,
-    /// Number of ticks in a row that ended after the next one was due.
-    late_ticks: u8,
     /// Whether the limit switches were open at the end of the previous tick.
     limits: [bool; 2],
 }
@@ -95,7 +93,6 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
         watchdog,
         wraps: 0,
         overrun: false,
-        late_ticks: 0,
         limits: [false; 2],
     };
     (hardware, line, start)
@@ -147,15 +144,14 @@ impl Board<SENSORS> for Hardware {
         self.motor.drive(output);
     }
 
-    /// Does not feed the watchdog after three late ticks in a row, which are a fault.
-    fn feed_watchdog(&mut self) {
+    fn end_tick(&mut self) {
         self.limits = pins::limits();
         self.overrun = tick_is_due();
         self.wraps = self.wraps.wrapping_add(self.overrun.into());
-        self.late_ticks = if self.overrun { self.late_ticks.saturating_add(1) } else { 0 };
-        if self.late_ticks < 3 {
-            self.watchdog.feed();
-        }
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
     }
 
     /// From the tick's timer, which counts down.

@@ -21,6 +21,7 @@ use crate::peripherals::rcc::{Crystal, Rcc};
 use crate::peripherals::usart::Usart;
 use crate::processor::flash_cache::FlashCache;
 use crate::processor::system::System;
+use crate::timing::CoreTiming;
 use crate::wiring::BoardWiring;
 
 /// Number of ports, A to I.
@@ -73,6 +74,8 @@ pub struct Conditions {
     pub chip_v: f32,
     /// The brown-out level in the option bytes.
     pub brown_out: BrownOut,
+    /// How long instructions take.
+    pub timing: CoreTiming,
     /// Whether the chip holds the factory's calibration of the reference (VREFIN_CAL); for negative controls.
     pub is_calibrated: bool,
 }
@@ -113,6 +116,7 @@ pub(crate) struct Bus {
     core_coupled: Vec<u8>,
     /// Contents of the reserved space that ends at the SRAM; empty unless it behaves as memory.
     pub(crate) below_sram: Vec<u8>,
+    pub(crate) timing: CoreTiming,
     pub(crate) cache: FlashCache,
     pub(crate) system: System,
     pub(crate) rcc: Rcc,
@@ -177,7 +181,8 @@ impl Bus {
             sram,
             core_coupled,
             below_sram: Vec::new(),
-            cache: FlashCache::new(),
+            timing: conditions.timing,
+            cache: FlashCache::new(conditions.timing),
             system: System::new(),
             rcc,
             flash_control: 0,
@@ -213,7 +218,7 @@ impl Bus {
         self.system = System::new();
         self.system.mpu.ignored = mpu_is_ignored;
         self.rcc.reset(flags | crate::peripherals::rcc::PIN_FLAG);
-        self.cache = FlashCache::new();
+        self.cache = FlashCache::new(self.timing);
         self.flash_control = 0;
         for (i, port) in self.ports.iter_mut().enumerate() {
             port.reset(b'A' + i as u8);
@@ -238,6 +243,12 @@ impl Bus {
     #[inline]
     pub(crate) fn instruction_wait(&mut self, target: u32) -> u32 {
         if target >> 24 == 8 { self.cache.jump(target) } else { 0 }
+    }
+
+    /// Cycles for which the instruction whose last byte is at `address` waits for the flash, by [`CoreTiming::Slow`].
+    #[inline]
+    pub(crate) fn go_on_to(&mut self, address: u32) -> u32 {
+        if address >> 24 == 8 { self.cache.go_on_to(address) } else { 0 }
     }
 
     /// DSB: writes to the clock-enable registers have taken effect.

@@ -38,7 +38,7 @@ impl Microcontroller {
         if let Some(base) = base {
             self.registers.set(rn, base);
         }
-        self.loaded = true;
+        self.loaded = self.may_overlap(loaded);
         self.load_into(rt, value)
     }
 

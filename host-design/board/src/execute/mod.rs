@@ -2,7 +2,7 @@
 //!
 //! Cycles follow the table of the Cortex-M4 Technical Reference Manual (DDI 0439, 3.3), with single-cycle stores (the
 //! write buffer), two cycles for refilling the pipeline, and the flash accelerator of
-//! [`crate::processor::flash_cache`]. They are approximate: overlaps are modelled for loads alone.
+//! [`crate::processor::flash_cache`]. They are approximate: see [`crate::timing`].
 
 mod arithmetic;
 mod data;
@@ -52,7 +52,7 @@ impl Microcontroller {
             Op::LoadLiteral { unit, rt, address } => {
                 self.cycles += u32::from(!loaded);
                 let value = self.load(address, unit)?;
-                self.loaded = true;
+                self.loaded = self.may_overlap(loaded);
                 self.load_into(rt, value)
             }
             _ if op.is_float() => self.float(op),

@@ -5,6 +5,7 @@ use crate::error::{Stopped, Trap, Violation};
 use crate::instruction::Op;
 use crate::machine::Microcontroller;
 use crate::peripherals::rcc::{SOFTWARE_FLAG, WATCHDOG_FLAG};
+use crate::timing::CoreTiming;
 
 impl Microcontroller {
     /// Runs until a time.
@@ -91,12 +92,17 @@ impl Microcontroller {
         self.bus.pc = pc;
         self.executed += 1;
         self.cycles = 1;
+        let is_slow = self.bus.timing == CoreTiming::Slow;
         let it = self.registers.it;
         let done = match self.decoded_at(pc) {
             Ok(place) => {
                 let instruction = self.decoded[place];
                 self.next = pc.wrapping_add(instruction.length.into());
                 self.registers.r[15] = pc.wrapping_add(4);
+                if is_slow {
+                    let last = pc.wrapping_add(u32::from(instruction.length) - 1);
+                    self.cycles += self.pipeline.wait_for_result(instruction.op) + self.bus.go_on_to(last);
+                }
                 if it == 0 {
                     self.in_it = false;
                     self.execute(instruction.op)
@@ -113,6 +119,9 @@ impl Microcontroller {
                 self.registers.it = it;
                 self.fault(fault)?;
             }
+        }
+        if is_slow {
+            self.bus.cache.spend(self.cycles);
         }
         self.bus.now += Time::from(self.cycles) * self.bus.hclk;
         Ok(())

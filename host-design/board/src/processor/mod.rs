@@ -3,6 +3,7 @@
 pub(crate) mod flash_cache;
 pub(crate) mod mpu;
 pub(crate) mod nvic;
+pub(crate) mod pipeline;
 pub(crate) mod registers;
 pub(crate) mod system;
 pub(crate) mod systick;

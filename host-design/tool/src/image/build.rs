@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use super::board::BoardName;
+use super::checksum::with_reference;
 use super::compiler::{Compiler, compiler, target_directory};
 use super::error::{BuildError, TARGET};
 use super::kept;
@@ -167,8 +168,8 @@ fn compile(kind: ImageKind, gains: Option<&Path>, name: &str) -> Result<PathBuf,
     }
     let built = target_directory.join(TARGET).join(PROFILE).join("upright-image");
     let list = built.with_extension("d");
-    let elf = std::fs::read(&built).map_err(|source| BuildError::File { path: built, source })?;
-    write_atomically(&image, &elf)?;
+    let elf = std::fs::read(&built).map_err(|source| BuildError::File { path: built.clone(), source })?;
+    write_atomically(&image, &with_reference(&built, elf)?)?;
     kept::keep(&image, &cargo, &version, begin, &list, &root)
         .map_err(|source| BuildError::File { path: list, source })?;
     Ok(image)

@@ -66,6 +66,11 @@ impl ImageChip {
         }
     }
 
+    /// Whether any of the chips has flash there.
+    pub(super) fn has_flash_at(address: u64) -> bool {
+        [Self::F4, Self::Rp2040].into_iter().any(|chip| chip.flash().contains(&address))
+    }
+
     fn flash(self) -> std::ops::Range<u64> {
         match self {
             Self::F4 => 0x0800_0000..0x1000_0000,

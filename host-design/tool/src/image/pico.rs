@@ -6,6 +6,7 @@ use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source, write_atomically};
 
 use super::build::{PROFILE, counts_all, images, one_at_a_time};
+use super::checksum::with_reference;
 use super::compiler::{Compiler, compiler_for_chips};
 use super::error::BuildError;
 use super::pico_board::PicoBoard;
@@ -61,5 +62,8 @@ fn compiled(target: &str, gains: &Path) -> Result<Vec<u8>, BuildError> {
         return Err(BuildError::Compiler(String::from_utf8_lossy(&output.stderr).into_owned()));
     }
     let path = target_directory.join(target).join(PROFILE).join("upright-rp2040");
-    std::fs::read(&path).map_err(|source| BuildError::File { path, source })
+    match std::fs::read(&path) {
+        Ok(elf) => Ok(with_reference(&path, elf)?),
+        Err(source) => Err(BuildError::File { path, source }),
+    }
 }

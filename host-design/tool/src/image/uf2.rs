@@ -25,7 +25,8 @@ pub fn uf2(family: u32, path: &Path, elf: &[u8]) -> Result<Vec<u8>, ElfError> {
         let bytes = segment.data(file.endian(), elf).unwrap_or_default();
         if segment.p_type(file.endian()) == object::elf::PT_LOAD && FLASH.contains(&address) {
             let begin = (address - FLASH.start) as usize;
-            flash.resize(flash.len().max(begin + bytes.len()), 0);
+            // What no segment fills stays erased, as the image's checksum takes it.
+            flash.resize(flash.len().max(begin + bytes.len()), 0xff);
             flash[begin..begin + bytes.len()].copy_from_slice(bytes);
         }
     }

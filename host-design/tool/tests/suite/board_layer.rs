@@ -13,7 +13,7 @@ use upright_tool::image::{BoardName, ImageKind, flash_checksum};
 use upright_tool::monitor::Monitor;
 
 use crate::equipment::built;
-use crate::powered::{BAUD, Powered, image};
+use crate::powered::{BAUD, Powered, image, sealed};
 
 const TIM1: u32 = 0x4001_0000;
 const RCC_CR: u32 = 0x4002_3800;
@@ -130,13 +130,14 @@ fn first_gain(board: &SimulatedBoard) -> u32 {
     (0x0800_0000..0x0801_0000).step_by(4).find(here).expect("the table is there")
 }
 
-/// A bit of the first gain flips in flash before power comes.
+/// A bit of the first gain was wrong already when the image was linked.
 #[test]
 fn a_damaged_table_is_reported_and_cannot_be_cleared() {
     let Some(image) = image() else { return };
-    let mut run = Powered::strict(&image, &Conditions::f405(1));
-    let address = first_gain(&run.board);
-    run.board.apply(Input::FlipBit { address, bit: 5 });
+    let address = first_gain(&SimulatedBoard::power_on(&image, &Conditions::f405(1), Rules::STRICT).unwrap());
+    let (end, byte) = (image.end(), image.flash()[address as usize & 0xff_ffff]);
+    let mut run =
+        Powered::strict(&sealed(image.with_bytes(address, vec![byte ^ 1 << 5]), end), &Conditions::f405(1));
     run.run(0.05);
     assert_eq!(run.last(), (State::Fault, Some(Fault::Table)));
     run.ask(1, Request::Clear);

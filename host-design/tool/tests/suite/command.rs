@@ -2,12 +2,14 @@
 
 use std::process::{Command, Output};
 
+use upright_test_support::limits::output;
+
 use crate::published::rig_path;
 
 pub(crate) const SINGLE: &str = "single-quanser-ip02";
 
 pub(crate) fn upright(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap()
+    output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments))
 }
 
 pub(crate) fn status(output: &Output) -> i32 {

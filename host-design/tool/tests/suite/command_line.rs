@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use upright_test_support::limits::output;
+
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
 use crate::published::rig_path;
 use serde_json::Value;
@@ -191,7 +193,7 @@ fn a_table_of_an_older_format_does_not_compile_and_the_error_says_what_to_do() {
         let arguments = "check --quiet --offline --package upright --lib --features gains-from-env";
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(arguments.split(' '));
-        cargo.current_dir(upright_test_support::repository()).env("UPRIGHT_GAINS", path).output().unwrap()
+        output(cargo.current_dir(upright_test_support::repository()).env("UPRIGHT_GAINS", path))
     };
     let refused = compiled("older-format.gains");
     assert!(stderr(&refused).contains("this gain table has format 7"), "{}", stderr(&refused));
@@ -325,11 +327,11 @@ fn the_example_that_the_help_says_falls_does_fall() {
     let help = upright(&["simulate", "--help"]);
     let example = stdout(&help).lines().find_map(|line| line.trim().strip_suffix("falls")).unwrap().trim();
     let arguments: Vec<&str> = example.split_whitespace().skip(1).collect();
-    let output = Command::new(env!("CARGO_BIN_EXE_upright"))
-        .args(&arguments)
-        .current_dir(rig_path(SINGLE).parent().unwrap().parent().unwrap())
-        .output()
-        .unwrap();
+    let output = output(
+        Command::new(env!("CARGO_BIN_EXE_upright"))
+            .args(&arguments)
+            .current_dir(rig_path(SINGLE).parent().unwrap().parent().unwrap()),
+    );
     assert_eq!(status(&output), 1, "{example}: {}", stdout(&output));
 }
 

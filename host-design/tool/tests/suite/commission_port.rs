@@ -12,6 +12,7 @@ use upright_design::design::design;
 use upright_design::harness::with_firmware;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
+use upright_test_support::limits::accepted;
 use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, MachineAtHand,
     PersonTask, Planted, Simulated, Stop,
@@ -32,7 +33,7 @@ fn serve(
     planted: Option<Planted>,
     tasks: &Receiver<PersonTask>,
 ) {
-    let (mut stream, _) = listener.accept().unwrap();
+    let mut stream = accepted(listener, "the tool connects");
     let (reader, received) = channel();
     let mut incoming = stream.try_clone().unwrap();
     std::thread::spawn(move || {

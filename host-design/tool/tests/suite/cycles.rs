@@ -1,14 +1,15 @@
 //! What a tick of the flashed image costs, on the virtual board.
 
 use upright::table::Law;
-use upright_board::{Conditions, Image, Rules, SimulatedBoard};
+use upright_board::{Conditions, CoreTiming, Image, Rules, SimulatedBoard};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_tool::image::{BoardName, ImageKind};
+use upright_tool::image::{BoardName, ImageKind, compiler};
 use upright_tool::in_the_loop::{Span, TickCycles, measure};
 
 use crate::equipment::built;
+use crate::powered::sealed;
 use crate::published::rig_and_table;
 
 /// Goals for the median of balancing: from the tick to the output, the whole task and the jitter of the output (µs).
@@ -18,34 +19,58 @@ const GOAL_JITTER_US: f64 = 1.0;
 /// The goal for the controller alone.
 const GOAL_CONTROLLER_CYCLES: u32 = 900;
 
-/// Limits of the largest values, 10 % above those measured with Rust 1.96: from the tick to the output, the whole task
-/// in any state, the difference of the latency between any two ticks (µs), and the controller alone.
-const LATENCY_US: f64 = 24.6;
-const TASK_US: f64 = 31.5;
-const JITTER_US: f64 = 15.8;
-const CONTROLLER_CYCLES: u32 = 2_230;
+/// Largest values: from the tick to the output, the whole task in any state, the difference of the latency between any
+/// two ticks (µs), and the controller alone (cycles).
+#[derive(Debug, Clone, Copy)]
+struct Largest {
+    latency_us: f64,
+    task_us: f64,
+    jitter_us: f64,
+    controller_cycles: f64,
+}
 
-fn measured(rig: &Rig, table: &TableValues, image: &Image) -> TickCycles {
+/// The largest values as measured, by the compiler: it decides what is inlined into the part of the tick that is
+/// compiled for size. A change that makes one of them a tenth larger has to say so here.
+const MEASURED: [(&str, Largest); 2] = [
+    (
+        "rustc 1.95",
+        Largest { latency_us: 22.16, task_us: 30.51, jitter_us: 15.18, controller_cycles: 2083.0 },
+    ),
+    (
+        "rustc 1.96",
+        Largest { latency_us: 21.77, task_us: 31.73, jitter_us: 14.82, controller_cycles: 2063.0 },
+    ),
+];
+
+/// What was measured with the compiler of the image; with another one, only the quarter of the period counts.
+fn largest() -> Option<Largest> {
+    let version = compiler().unwrap().version;
+    MEASURED.into_iter().find(|(begin, _)| version.starts_with(begin)).map(|(_, largest)| largest)
+}
+
+fn measured(rig: &Rig, table: &TableValues, image: &Image, timing: CoreTiming) -> TickCycles {
     let scenario =
         Scenario { duration_s: 0.5, force_noise_n: 0.1, substeps: 2, ..Scenario::at_rest(rig, Law::Lqr) };
-    let cycles = measure(rig, table, &scenario, image, &Conditions::f405(1)).unwrap();
+    let conditions = Conditions { timing, ..Conditions::f405(1) };
+    let cycles = measure(rig, table, &scenario, image, &conditions).unwrap();
     assert_eq!(cycles.ended, None);
     cycles
 }
 
-/// What is above its goal or its limit.
-fn beyond(cycles: &TickCycles) -> Vec<&'static str> {
+/// What is above its goal, or more than a tenth above `measured`.
+fn beyond(cycles: &TickCycles, measured: Option<Largest>) -> Vec<&'static str> {
     let (typical, balancing) = (cycles.typical.unwrap(), cycles.balancing.unwrap());
+    let is_beyond = |value: f64, of: fn(Largest) -> f64| measured.is_some_and(|most| value > 1.1 * of(most));
     let us = |span: Option<Span>| span.unwrap().us;
     let all = [
         ("goal of the latency", us(typical.latency) > GOAL_LATENCY_US),
         ("goal of the jitter", us(typical.jitter) > GOAL_JITTER_US),
         ("goal of the task", typical.whole.us > GOAL_TASK_US),
         ("goal of the controller", typical.controller.cycles > GOAL_CONTROLLER_CYCLES),
-        ("latency", us(balancing.latency) > LATENCY_US),
-        ("jitter", us(balancing.jitter) > JITTER_US),
-        ("task", cycles.all.whole.us > TASK_US),
-        ("controller", cycles.all.controller.cycles > CONTROLLER_CYCLES),
+        ("latency", is_beyond(us(balancing.latency), |most| most.latency_us)),
+        ("jitter", is_beyond(us(balancing.jitter), |most| most.jitter_us)),
+        ("task", is_beyond(cycles.all.whole.us, |most| most.task_us)),
+        ("controller", is_beyond(cycles.all.controller.cycles.into(), |most| most.controller_cycles)),
         ("quarter", cycles.check().is_err()),
     ];
     all.into_iter().filter(|(_, is_beyond)| *is_beyond).map(|(name, _)| name).collect()
@@ -75,7 +100,7 @@ fn slower(image: &Image, turns: u8) -> Image {
     let mut code: Vec<u8> = half_words.into_iter().flat_map(u16::to_le_bytes).collect();
     code.extend(handler.to_le_bytes());
     let vector = (at | 1).to_le_bytes().to_vec();
-    image.clone().with_bytes(SYS_TICK, vector).with_bytes(at, code)
+    sealed(image.clone().with_bytes(SYS_TICK, vector).with_bytes(at, code), image.end())
 }
 
 #[test]
@@ -83,10 +108,10 @@ fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_
     let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
-    let measured = |image: &Image| measured(&rig, &table, image);
-    let cycles = measured(&image);
+    let measured = |image: &Image, timing| measured(&rig, &table, image, timing);
+    let (cycles, largest) = (measured(&image, CoreTiming::Quick), largest());
     println!("{cycles:#?}");
-    assert_eq!(beyond(&cycles), [""; 0]);
+    assert_eq!(beyond(&cycles, largest), [""; 0]);
     let (off, balancing) = (cycles.off.unwrap(), cycles.balancing.unwrap());
     assert!(off.ticks > 1000 && balancing.ticks >= 500 && cycles.all.ticks == off.ticks + balancing.ticks);
     // All parts are found in the code, and make up the whole.
@@ -100,7 +125,25 @@ fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_
 
     // Negative controls: 10 µs more, and half a period more.
     let goals = ["goal of the latency", "goal of the task"];
-    assert_eq!(beyond(&measured(&slower(&image, 4))), [&goals[..], &["latency", "task"]].concat());
-    let error = measured(&slower(&image, 210)).check().unwrap_err().to_string();
+    let with_delay = measured(&slower(&image, 4), CoreTiming::Quick);
+    assert_eq!(
+        beyond(&with_delay, MEASURED.map(|(_, largest)| largest).first().copied()),
+        [&goals[..], &["latency", "task"]].concat()
+    );
+    let error = measured(&slower(&image, 210), CoreTiming::Quick).check().unwrap_err().to_string();
     assert!(error.contains("a quarter of its period") && error.contains("period_s"), "{error}");
+}
+
+/// docs/results/board.md says so.
+#[test]
+fn by_the_slow_model_the_image_misses_the_goals_of_task_and_controller_and_no_other() {
+    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let (rig, table) = rig_and_table("quadruple-paper").clone();
+    let cycles = measured(&rig, &table, &image, CoreTiming::Slow);
+    println!("{cycles:#?}");
+    assert_eq!(beyond(&cycles, None), ["goal of the task", "goal of the controller"]);
+    // No more than a tenth above what that page says.
+    let (controller, task) = (cycles.typical.unwrap().controller.cycles, cycles.typical.unwrap().whole.us);
+    assert!(controller < 1130 && task < 17.0, "{controller} {task}");
 }

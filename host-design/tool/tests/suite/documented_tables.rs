@@ -6,6 +6,7 @@ use std::process::Command;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
+use upright_test_support::limits::output;
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
 use upright_tool::image::{BoardName, CODE_LIMIT, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, RAM_LIMIT};
@@ -16,7 +17,7 @@ use crate::published::rig_path;
 use crate::stepper_command::{with_motor, with_slow_servo};
 
 fn upright(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap();
+    let output = output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments));
     String::from_utf8(output.stdout).unwrap()
 }
 

@@ -9,6 +9,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use upright_test_support::limits::{joined, output, received};
 use upright_tool::image::{
     ImageKind, LinkedImage, StackError, forbidden_functions, forbidden_in_handlers, size, stack_bound,
 };
@@ -22,13 +23,13 @@ fn path_in_the_loop() -> Option<&'static Path> {
 }
 
 fn upright(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap()
+    output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments))
 }
 
 /// Runs the tool with an empty PATH.
 fn upright_alone(arguments: &[&str]) -> Output {
     let nowhere = tempfile::tempdir().unwrap();
-    Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).env("PATH", nowhere.path()).output().unwrap()
+    output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).env("PATH", nowhere.path()))
 }
 
 /// The compiler writes every image to the same file, and other processes compile, too.
@@ -45,8 +46,8 @@ fn an_image_waits_for_the_one_that_is_being_compiled() {
     let builder = std::thread::spawn(move || done.send(built(ImageKind::InTheLoop)).unwrap());
     assert_eq!(is_done.recv_timeout(patience), Err(RecvTimeoutError::Timeout));
     other.unlock().unwrap();
-    assert_eq!(is_done.recv().unwrap().as_deref(), Some(path));
-    builder.join().unwrap();
+    assert_eq!(received(&is_done, "the image").as_deref(), Some(path));
+    joined(builder, "the image is built");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use upright_design::rig::Rig;
+use upright_test_support::limits::output;
 use upright_tool::import::rig_file;
 
 /// A cart and two links that hang, drawn along y. The second link has a tip mass that is fixed to it.
@@ -108,8 +109,7 @@ fn the_command_writes_a_rig_file_that_can_be_designed() {
     let folder = tempfile::tempdir().unwrap();
     let [urdf, rig] = ["double.urdf", "double.toml"].map(|name| folder.path().join(name));
     std::fs::write(&urdf, DOUBLE).unwrap();
-    let run =
-        |arguments: &[&str]| Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).output().unwrap();
+    let run = |arguments: &[&str]| output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments));
     let output = run(&["import", urdf.to_str().unwrap(), "--out", rig.to_str().unwrap()]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let output = run(&["design", rig.to_str().unwrap(), "--no-write", "--json"]);

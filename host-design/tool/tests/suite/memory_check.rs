@@ -2,17 +2,23 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use upright::flash_image::REFERENCE_WORD;
 use upright::protocol::message::{Answer, Reply, Request};
+use upright::supervision::fault::Fault;
+use upright::supervision::supervisor::State;
 use upright_board::{Conditions, Image, Input};
 use upright_design::conversation::words;
+use upright_tool::image::{BoardName, ImageKind};
 use upright_tool::in_the_loop::RULES;
 
+use crate::equipment::built_for;
 use crate::powered::{Powered, image};
+use crate::published::rig_and_table_with_motions;
 
 /// The time until the table is found to have changed, and the watchdog's longest time after it.
 const TABLE_S: f64 = 0.02;
 /// Two passes over the image, and the watchdog.
-const IMAGE_S: f64 = 0.9;
+const IMAGE_S: f64 = 0.25;
 
 /// The image between two ticks, motor off.
 fn running(image: &Image) -> Powered {
@@ -63,9 +69,19 @@ fn the_record_of_the_crash_names_the_word_that_has_changed() {
     );
 }
 
+/// The image with stored motions, which are half of it.
+fn image_with_motions() -> Option<Image> {
+    let (rig, table) = rig_and_table_with_motions("quadruple-paper");
+    let elf = built_for(ImageKind::Board(BoardName::WeactF405), rig, table)?;
+    Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
+}
+
+/// Functions of the tick, by parts of their mangled names.
+const OF_THE_TICK: [&str; 4] = ["hot_path3act", "hot_path7predict", "SysTick", "12test_sensors"];
+
 #[test]
-fn every_bit_of_the_image_is_read_within_a_second() {
-    let Some(image) = image() else { return };
+fn every_bit_of_the_image_is_read_within_a_quarter_of_a_second() {
+    let Some(image) = image_with_motions() else { return };
     let (run, begin) = (running(&image), 0x0800_0000);
     let end = begin + image.end() as u32;
     let mut random = Pcg64::seed_from_u64(2);
@@ -75,4 +91,56 @@ fn every_bit_of_the_image_is_read_within_a_second() {
     }
     // Negative control: behind the image.
     assert!(!restarts(&run, &[(end + 4, 0)], IMAGE_S));
+}
+
+/// The constants of a function that the tick does not reach with the motor off change at any time of a pass: also when
+/// they have just been read, and wait for the next pass.
+#[test]
+fn the_code_of_the_tick_is_read_within_a_quarter_of_a_second_from_any_time_on() {
+    let Some(image) = image_with_motions() else { return };
+    let mut run = running(&image);
+    let act = image.object("hot_path3act").unwrap();
+    for part in 0..13 {
+        run.run(0.055 + 0.008 * f64::from(part));
+        assert!(restarts(&run, &[(act.end - 2, 0)], IMAGE_S), "{part}");
+    }
+}
+
+/// State, fault and whether the power stage was ever enabled, after a start and an attempt to clear the fault.
+fn started(image: &Image) -> (State, Option<Fault>, bool) {
+    let mut run = Powered::with(image, &Conditions::f405(1), RULES);
+    run.run(0.06);
+    run.ask(1, Request::Clear);
+    run.run(0.12);
+    let (state, fault) = run.last();
+    (state, fault, run.board.driven().enabled > 0)
+}
+
+#[test]
+fn code_that_is_damaged_before_power_comes_never_arms() {
+    let Some(image) = image() else { return };
+    let (begin, flash) = (0x0800_0000, image.flash());
+    let with_a_flip = |address: u32, bit: u8| {
+        let byte = flash[(address - begin) as usize] ^ 1 << bit;
+        image.clone().with_bytes(address, vec![byte])
+    };
+    let mut random = Pcg64::seed_from_u64(3);
+    for name in OF_THE_TICK {
+        let function = image.object(name).unwrap_or_else(|| panic!("no function {name}"));
+        // The constants at its end, which no instruction of a tick with the motor off uses.
+        let address = if name == "SysTick" { function.end - 1 } else { random.random_range(function) };
+        let flip = (address, random.random_range(0..8));
+        let found = started(&with_a_flip(flip.0, flip.1));
+        assert_eq!(found, (State::Fault, Some(Fault::Image), false), "{name} {flip:x?}");
+    }
+    // An image that the tool has not finished.
+    let reference = begin + 4 * REFERENCE_WORD as u32;
+    let bare = image.clone().with_bytes(reference, vec![0; 4]);
+    assert_eq!(started(&bare), (State::Fault, Some(Fault::Image), false));
+    // Negative controls: nothing is damaged, or only what is behind the image.
+    assert_eq!(started(&image), (State::Disarmed, None, false));
+    assert_eq!(
+        started(&image.clone().with_bytes(begin + flash.len() as u32, vec![0])),
+        (State::Disarmed, None, false)
+    );
 }

@@ -30,6 +30,7 @@ use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
+use upright_test_support::limits::{PATIENCE, joined, output_of};
 use upright_tool::in_the_loop::{RunPlace, serve};
 use upright_tool::monitor::{Ended, Monitor, action, view};
 
@@ -345,8 +346,8 @@ fn monitored(said: &str) -> Vec<Value> {
         .spawn()
         .unwrap();
     monitor.stdin.take().unwrap().write_all(said.as_bytes()).unwrap();
-    let output = monitor.wait_with_output().unwrap();
-    server.join().unwrap().unwrap();
+    let output = output_of(monitor, "the monitor ends after 3 s", PATIENCE);
+    joined(server, "the simulation behind the monitor ends").unwrap();
     assert!(output.status.success());
     output
         .stdout
@@ -361,7 +362,7 @@ fn a_set_point_from_the_monitor_moves_the_firmware_and_holds_it() {
     // Negative control: without a request, nothing moves it. Both take real time, so they run at the same time.
     let control = std::thread::spawn(|| monitored(""));
     let moved = monitored("set-point 0.05\n");
-    let still = control.join().unwrap();
+    let still = joined(control, "the monitor without a request");
     let last = moved.last().unwrap();
     assert!(moved.len() > 50, "{}", moved.len());
     assert!(moved.iter().all(|telemetry| telemetry["state"] == "Balancing"), "{last}");

@@ -4,6 +4,7 @@ use crate::published::{designed, rig, rig_of};
 use upright_design::design::{Certified, DesignError, Feedback, design, is_stable_sampled};
 use upright_design::numerics::{Matrix, Real, Wide, spectral_radius, with_precision};
 use upright_design::rig::{Integral, Rig};
+use upright_test_support::limits::output;
 
 const WITH_ENCODERS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
@@ -136,10 +137,12 @@ fn a_rig_without_stable_observer_ends_with_status_3_and_says_why() {
         );
         std::fs::write(&file, text).unwrap();
         let out = folder.path().join(format!("gains-{measured}.rs"));
-        let output = std::process::Command::new(env!("CARGO_BIN_EXE_upright"))
-            .args([std::ffi::OsStr::new("design"), file.as_os_str(), "--out".as_ref(), out.as_os_str()])
-            .output()
-            .unwrap();
+        let output = output(std::process::Command::new(env!("CARGO_BIN_EXE_upright")).args([
+            std::ffi::OsStr::new("design"),
+            file.as_os_str(),
+            "--out".as_ref(),
+            out.as_os_str(),
+        ]));
         (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap(), out.exists())
     };
     let (code, stderr, written) = status(1);

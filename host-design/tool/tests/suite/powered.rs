@@ -1,5 +1,6 @@
 //! The flashed image on the virtual board, switched on and listened to.
 
+use upright::flash_image::{REFERENCE_WORD, checksum};
 use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Command, Message, Reply, Request, Telemetry};
@@ -16,6 +17,12 @@ pub(crate) const BAUD: u32 = 460_800;
 pub(crate) fn image() -> Option<Image> {
     let elf = built(ImageKind::Board(BoardName::WeactF405))?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
+}
+
+/// The image whose first `end` bytes are what was linked, with the checksum of what they are now.
+pub(crate) fn sealed(image: Image, end: usize) -> Image {
+    let word = checksum(&image.flash()[..end]);
+    image.with_bytes(0x0800_0000 + 4 * REFERENCE_WORD as u32, word.to_le_bytes().to_vec())
 }
 
 /// A board with all contacts closed and the motor's supply on.

@@ -7,6 +7,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use upright_test_support::limits::output;
+
 use crate::report_devtools::Browser;
 use crate::report_rigs::{LINEAR, SINGLE};
 
@@ -136,7 +138,7 @@ fn a_test_without_its_browser_passes_says_so_and_fails_where_one_is_required() {
         if is_required {
             tests.env("UPRIGHT_REQUIRE_BROWSER", "1");
         }
-        tests.output().unwrap()
+        output(&mut tests)
     };
     let left_out = tested(false);
     assert!(left_out.status.success(), "{left_out:?}");

@@ -2,18 +2,19 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use upright_test_support::limits::output;
 
 const RIG: &str = "single-quanser-ip02";
 
 fn report(arguments: &[&str], folder: &Path) -> Output {
     let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(RIG).with_extension("toml");
     let rig = rig.canonicalize().unwrap();
-    Command::new(env!("CARGO_BIN_EXE_upright"))
-        .args(["report", rig.to_str().unwrap(), "--runs", "2"])
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
+    output(
+        Command::new(env!("CARGO_BIN_EXE_upright"))
+            .args(["report", rig.to_str().unwrap(), "--runs", "2"])
+            .args(arguments)
+            .current_dir(folder),
+    )
 }
 
 fn names(folder: &Path) -> Vec<String> {

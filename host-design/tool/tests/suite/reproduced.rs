@@ -6,6 +6,8 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
+use upright_test_support::limits::output;
+
 use crate::documented_tables::between;
 use crate::documents::read;
 
@@ -21,11 +23,11 @@ pub(crate) struct Reproduced {
 /// The command, started in a folder that is not the checkout.
 pub(crate) static REPRODUCED: LazyLock<Reproduced> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_upright"))
-        .args(["reproduce", "--out", "new/folder"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
+    let output = output(
+        Command::new(env!("CARGO_BIN_EXE_upright"))
+            .args(["reproduce", "--out", "new/folder"])
+            .current_dir(folder.path()),
+    );
     let entries = std::fs::read_dir(folder.path().join("new/folder")).unwrap();
     let read = |entry: std::fs::DirEntry| {
         (entry.file_name().into_string().unwrap(), std::fs::read(entry.path()).unwrap())

@@ -3,10 +3,12 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use upright_test_support::limits::output;
+
 use crate::published::rig_path;
 
 fn robust(rig: &Path, more: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upright")).arg("robust").arg(rig).args(more).output().unwrap()
+    output(Command::new(env!("CARGO_BIN_EXE_upright")).arg("robust").arg(rig).args(more))
 }
 
 fn status_and_reason(output: &Output) -> (i32, String) {

@@ -9,6 +9,7 @@ use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 use upright_page::{Desk, TICKS};
+use upright_test_support::limits::{PATIENCE, output};
 use upright_tool::site::module;
 
 use crate::equipment::{is_required, not_exercised};
@@ -65,7 +66,7 @@ pub(crate) fn in_node_with_time(questions: &[Value]) -> (Vec<Value>, String) {
     std::fs::write(&wasm, module().unwrap()).unwrap();
     std::fs::write(&asked, json!(questions).to_string()).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/in_node.mjs");
-    let output = Command::new("node").arg(script).args([&wasm, &asked]).output().expect("Node is installed");
+    let output = output(Command::new("node").arg(script).args([&wasm, &asked]));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let answers: Vec<String> = serde_json::from_slice(&output.stdout).unwrap();
     let answers = answers.iter().map(|answer| serde_json::from_str(answer).unwrap()).collect();
@@ -144,7 +145,7 @@ fn tables_and_runs_of_all_rigs_have_the_same_bits_in_the_page() {
         json!(compared.questions)
     ));
     let is_done = format!("found.length === {}", compared.questions.len());
-    assert!(comes_within(&mut browser, 300.0, &is_done), "{}", browser.value("found"));
+    assert!(comes_within(&mut browser, PATIENCE.as_secs_f64(), &is_done), "{}", browser.value("found"));
     compared.assert_same(browser.value("found").as_array().unwrap());
 
     // Each example is shown, with its run.

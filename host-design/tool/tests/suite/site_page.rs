@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use upright_page::Desk;
+use upright_test_support::limits::{PATIENCE, output};
 use upright_tool::site::{examples, lessons, module, page};
 
 use crate::report_devtools::Browser;
@@ -26,7 +27,7 @@ pub(crate) fn until(browser: &mut Browser, expression: &str) {
     let begin = Instant::now();
     while browser.value(&format!("Boolean(!upright.isBusy() && ({expression}))")) != true {
         let told = browser.value("document.getElementById('told').textContent");
-        assert!(begin.elapsed() < Duration::from_secs(60), "never: {expression}; {told}");
+        assert!(begin.elapsed() < PATIENCE, "never: {expression}; {told}");
         std::thread::sleep(Duration::from_millis(50));
     }
 }
@@ -42,8 +43,8 @@ pub(crate) fn type_in(browser: &mut Browser, toml: &str) {
 pub(crate) fn written(arguments: &[&str], option: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("written");
-    let status = Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).arg(option).arg(&file).output();
-    assert!(status.unwrap().status.success(), "{arguments:?}");
+    let written = output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).arg(option).arg(&file));
+    assert!(written.status.success(), "{arguments:?}");
     std::fs::read_to_string(file).unwrap()
 }
 

@@ -3,7 +3,8 @@
 //! Runs where `UPRIGHT_REQUIRE_WASM=1` is set, and needs Chromium or Chrome.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+
+use upright_test_support::limits::until as until_there;
 
 use crate::report_devtools::Browser;
 use crate::site_page::{TELEPHONE, opened_in, root, until as until_designed, written};
@@ -29,14 +30,9 @@ fn without_comments(file: &str) -> String {
 
 /// What the page has saved as `file`, once it is there.
 fn saved(file: &Path) -> String {
-    let begin = Instant::now();
-    loop {
-        match std::fs::read_to_string(file) {
-            Ok(text) if !text.is_empty() => return text,
-            _ => std::thread::sleep(Duration::from_millis(50)),
-        }
-        assert!(begin.elapsed() < Duration::from_secs(30), "{} is not saved", file.display());
-    }
+    until_there(&format!("{} is saved", file.display()), || {
+        std::fs::read_to_string(file).ok().filter(|text| !text.is_empty())
+    })
 }
 
 /// Types the paper's rig into the empty editor, and saves its table into a folder.

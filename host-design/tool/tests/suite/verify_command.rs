@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use upright_test_support::limits::output;
+
 use crate::published::rig_path;
 use serde_json::Value;
 
@@ -14,7 +16,7 @@ fn verify(rig: &Path, more: &[&str], threads: Option<&str>) -> Output {
     if let Some(threads) = threads {
         command.env("RAYON_NUM_THREADS", threads);
     }
-    command.output().unwrap()
+    output(&mut command)
 }
 
 fn status(output: &Output) -> i32 {

@@ -1,8 +1,8 @@
 //! Memory that nobody writes, checked while the processor has nothing else to do.
 
+use upright::flash_image::WordSums;
 use upright::gains::{SENSORS, STATES};
 use upright::table::GainTable;
-use upright::table::checksum::crc32;
 
 /// Ticks from one check to the next: 8 ms, if a tick is shorter. A check empties the caches of the flash, so the tick
 /// after it takes longer.
@@ -10,8 +10,12 @@ const TICKS_PER_CHECK: u32 = {
     let ticks = super::CLOCK_HZ / 125 / crate::CYCLES_PER_TICK;
     if ticks > 1 { ticks } else { 1 }
 };
-/// Bytes of the image that a check reads: 48 KiB in less than half a second.
-const BYTES_PER_CHECK: usize = 1024;
+/// Checks in which all of the image is read, whatever its size: 0.1 s. A bit that changes just behind the reader is
+/// found at the end of the next pass, so within 0.2 s.
+const CHECKS_PER_PASS: usize = {
+    let checks = super::CLOCK_HZ / 10 / (TICKS_PER_CHECK * crate::CYCLES_PER_TICK);
+    if checks > 1 { checks as usize } else { 1 }
+};
 
 unsafe extern "C" {
     static __sdata: u32;
@@ -20,36 +24,40 @@ unsafe extern "C" {
 }
 
 /// The image in flash: from its start to the end of the initial values of variables, which come last.
-fn image() -> &'static [u8] {
+fn words() -> &'static [u32] {
     const FLASH: usize = 0x0800_0000;
     // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
     unsafe {
         let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
         let end = (&raw const __sidata) as usize + values;
-        core::slice::from_raw_parts(FLASH as *const u8, end - FLASH)
+        core::slice::from_raw_parts(FLASH as *const u32, (end - FLASH) / 4)
     }
 }
 
-/// CRC-32 of the image, which identifies it.
-pub(super) fn image_checksum() -> u32 {
-    crc32(0, image())
+/// The same as bytes.
+pub(super) fn image() -> &'static [u8] {
+    // SAFETY: any word is four bytes.
+    unsafe { words().align_to::<u8>().1 }
 }
 
 /// Checks the gain table in RAM and the image in flash again and again.
 pub(crate) struct MemoryCheck {
     table: &'static GainTable<STATES, SENSORS>,
-    image_checksum: u32,
+    /// WordSums of the image at the start.
+    reference: WordSums,
     /// Interrupts until the next check, one of them in each tick.
     wait: u32,
-    /// Bytes of the image that have been read, and their CRC-32.
+    /// Words of the image that have been read, and their sums.
     read: usize,
-    crc: u32,
+    sums: WordSums,
 }
 
 impl MemoryCheck {
-    /// `image_checksum` is that of the start.
-    pub(crate) fn new(table: &'static GainTable<STATES, SENSORS>, image_checksum: u32) -> Self {
-        Self { table, image_checksum, wait: TICKS_PER_CHECK, read: 0, crc: 0 }
+    /// The check of this table, and of the image as it is now.
+    pub(super) fn new(table: &'static GainTable<STATES, SENSORS>) -> Self {
+        let mut reference = WordSums::default();
+        reference.add(words());
+        Self { table, reference, wait: TICKS_PER_CHECK, read: 0, sums: WordSums::default() }
     }
 
     /// To be called after each interrupt. If it is time, compares all of the table with its initial values in flash,
@@ -73,15 +81,15 @@ impl MemoryCheck {
                 }
             }
         }
-        let rest = image().get(self.read..).unwrap_or_default();
-        let part = rest.get(..BYTES_PER_CHECK).unwrap_or(rest);
-        self.crc = crc32(self.crc, part);
+        let rest = words().get(self.read..).unwrap_or_default();
+        let part = rest.get(..words().len().div_ceil(CHECKS_PER_PASS)).unwrap_or(rest);
+        self.sums.add(part);
         self.read += part.len();
-        if !part.is_empty() {
+        if part.len() < rest.len() {
             return None;
         }
-        let has_changed = self.crc != self.image_checksum;
-        (self.read, self.crc) = (0, 0);
-        has_changed.then_some(rest.as_ptr() as u32)
+        let has_changed = self.sums != self.reference;
+        (self.read, self.sums) = (0, WordSums::default());
+        has_changed.then_some(rest.as_ptr_range().end as u32)
     }
 }

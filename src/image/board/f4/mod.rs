@@ -22,8 +22,9 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
 use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::{CounterWidth, is_at_end};
-use upright::gains::SENSORS;
+use upright::gains::{SENSORS, STATES};
 use upright::protocol::message::Start;
+use upright::table::GainTable;
 
 use angles::Angles;
 pub(crate) use clock::CLOCK_HZ;
@@ -53,15 +54,17 @@ pub(crate) struct F4Board {
     clock_fault: bool,
     wrong_chip: bool,
     overrun: bool,
-    /// Number of ticks in a row that ended after the next one was due.
-    late_ticks: u8,
     /// Whether the limit switches were open at the end of the previous tick.
     limits: [bool; 2],
 }
 
 /// Sets up all peripherals but the watchdog, with the motor off. Takes at most 300 ms, even if a peripheral does not
-/// respond. Also returns what the board knows about the start.
-pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4Board, DmaLine, Start) {
+/// respond. Also returns the check of memory, and what the board knows about the start.
+pub(crate) fn set_up(
+    device: Peripherals,
+    buffer: &'static mut DmaBuffer,
+    table: &'static GainTable<STATES, SENSORS>,
+) -> (F4Board, DmaLine, MemoryCheck, Start) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
@@ -96,10 +99,13 @@ pub(crate) fn set_up(device: Peripherals, buffer: &'static mut DmaBuffer) -> (F4
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
         overrun: false,
-        late_ticks: 0,
         limits: [false; 2],
     };
-    (hardware, line, Start { reset, crash, image: memory::image_checksum() })
+    // In this order: what changes in between is found by the check.
+    let memory = MemoryCheck::new(table);
+    let mut start = Start { reset, crash, ..Start::default() };
+    start.compare_image(memory::image());
+    (hardware, line, memory, start)
 }
 
 impl F4Board {
@@ -171,16 +177,14 @@ impl Board<SENSORS> for F4Board {
         }
     }
 
-    /// Does not feed the watchdog after three late ticks in a row, which are a fault. (If it is not fed, the fastest
-    /// watchdog waits for two ticks.)
-    fn feed_watchdog(&mut self) {
+    fn end_tick(&mut self) {
         self.limits = pins::limits();
         self.overrun = tick_is_due();
-        self.late_ticks = if self.overrun { self.late_ticks.saturating_add(1) } else { 0 };
-        if self.late_ticks < 3 {
-            self.watchdog.feed();
-        }
         pins::show_tick(false);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
     }
 
     fn cycles(&self) -> u32 {

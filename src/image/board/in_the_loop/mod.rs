@@ -52,10 +52,6 @@ pub(crate) struct SimulatedPins {
 pub(crate) struct UncheckedMemory;
 
 impl UncheckedMemory {
-    pub(crate) fn new<T>(_table: &T, _image_checksum: u32) -> Self {
-        Self
-    }
-
     pub(crate) fn advance(&mut self) -> Option<u32> {
         None
     }
@@ -97,10 +93,11 @@ impl SimulatedLine {
 }
 
 /// Opens the channels and starts the counter of instructions.
-pub(crate) fn set_up(
+pub(crate) fn set_up<T>(
     device: Peripherals,
     buffer: &'static mut ReceivedBytes,
-) -> (SimulatedPins, SimulatedLine, Start) {
+    _table: &T,
+) -> (SimulatedPins, SimulatedLine, UncheckedMemory, Start) {
     let clock = device.TIM5;
     // 32 bits, one count per instruction.
     clock.arr().write(|w| w.arr().set(u32::MAX));
@@ -108,7 +105,7 @@ pub(crate) fn set_up(
     let (pins, serial) = open(device.USART1, device.USART2);
     let (producer, consumer) = buffer.0.split();
     let hardware = SimulatedPins { pins, frames: Frames::new(), received: producer, clock, spent: 0 };
-    (hardware, SimulatedLine { received: consumer, serial }, Start::default())
+    (hardware, SimulatedLine { received: consumer, serial }, UncheckedMemory, Start::default())
 }
 
 /// Starts nothing: each tick is made due by [`sleep`].

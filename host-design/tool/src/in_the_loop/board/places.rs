@@ -43,7 +43,7 @@ fn part_of(path: &str) -> Option<TickPart> {
         Some(TickPart::Control)
     } else if is("firmware::Firmware", &["::report", "::predict", "::complete"])
         || path.contains("protocol::queue")
-        || is("F4Board", &["::feed_watchdog"])
+        || is("F4Board", &["::end_tick", "::feed_watchdog"])
     {
         Some(TickPart::Rest)
     } else {

@@ -2,18 +2,16 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
 
 use serde_json::{Value, json};
+use upright_test_support::limits::{Running, received};
 
 use crate::equipment::{is_required, not_exercised};
 
-const PATIENCE: Duration = Duration::from_secs(60);
-
 pub(crate) struct Browser {
-    process: Child,
+    process: Running,
     input: ChildStdin,
     messages: Receiver<Value>,
     events: Vec<Value>,
@@ -48,7 +46,7 @@ impl Browser {
             .find(|path| path.is_file())?;
         let profile = tempfile::tempdir().unwrap();
         // The browser reads messages from descriptor 3 and writes to 4. Its sandbox does not run as root.
-        let mut process = Command::new("sh")
+        let process = Command::new("sh")
             .args(["-c", r#"exec "$0" "$@" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null"#])
             .arg(program)
             .args([
@@ -66,6 +64,7 @@ impl Browser {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
+        let mut process = Running(process);
         let (input, output) = (process.stdin.take().unwrap(), process.stdout.take().unwrap());
         let (sender, messages) = channel();
         std::thread::spawn(move || {
@@ -104,7 +103,7 @@ impl Browser {
         }
         self.input.write_all(format!("{message}\0").as_bytes()).unwrap();
         loop {
-            let answer = self.messages.recv_timeout(PATIENCE).expect("an answer of the browser");
+            let answer = received(&self.messages, &format!("the browser's answer to {method}"));
             if answer["id"] == json!(self.sent) {
                 assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
                 return answer["result"].clone();
@@ -130,7 +129,7 @@ impl Browser {
         self.events.clear();
         self.call("Page.navigate", json!({ "url": address }));
         while !self.events.iter().any(|event| event["method"] == "Page.loadEventFired") {
-            let event = self.messages.recv_timeout(PATIENCE).expect("the page loads");
+            let event = received(&self.messages, &format!("{address} is loaded"));
             self.events.push(event);
         }
     }
@@ -142,6 +141,25 @@ impl Browser {
             std::thread::sleep(std::time::Duration::from_millis(200));
             // In one expression: the page does nothing in between.
             self.value("(gc(), gc(), performance.memory.usedJSHeapSize)").as_f64().unwrap()
+        };
+        (0..5).map(moment).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Number of objects that the page keeps, after garbage collection: the least of several moments, because messages
+    /// on their way count, too. It depends on no timing, unlike the memory that they take.
+    pub(crate) fn objects(&mut self) -> f64 {
+        let moment = |_| {
+            std::thread::sleep(std::time::Duration::from_millis(200));
+            let kind =
+                self.call("Runtime.evaluate", json!({ "expression": "Object.prototype" }))["result"].clone();
+            let of_kind = json!({ "prototypeObjectId": kind["objectId"], "objectGroup": "counted" });
+            let found = self.call("Runtime.queryObjects", of_kind)["objects"]["objectId"].clone();
+            let count = json!({
+                "objectId": found, "functionDeclaration": "function () { return this.length; }", "returnByValue": true
+            });
+            let number = self.call("Runtime.callFunctionOn", count)["result"]["value"].as_f64().unwrap();
+            self.call("Runtime.releaseObjectGroup", json!({ "objectGroup": "counted" }));
+            number
         };
         (0..5).map(moment).fold(f64::INFINITY, f64::min)
     }
@@ -256,12 +274,5 @@ impl Browser {
             _ => None,
         };
         self.events.iter().filter_map(told).collect()
-    }
-}
-
-impl Drop for Browser {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
