@@ -53,6 +53,7 @@ mod twin_access;
 mod twin_guide;
 mod twin_page;
 mod twin_reload;
+mod twin_words;
 mod verify_command;
 mod virtual_board;
 
