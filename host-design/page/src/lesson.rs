@@ -42,7 +42,7 @@ pub struct TestedAnswers {
     pub wrong: Vec<f64>,
 }
 
-/// What is asked for, and when an answer is right.
+/// What is asked for, and when an answer is right. A wrong answer is told without what would be right.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Exercise {
@@ -84,12 +84,17 @@ impl Exercise {
                     ended(toml, &set, SECONDS)
                 };
                 let (here, further) = (ends(answer)?, ends(answer + step)?);
-                let said = |value: f64, end: &Option<(u64, String)>| match end {
-                    Some((_, name)) => format!("with {value} {unit} the motor is turned off (fault: {name})"),
-                    None => format!("with {value} {unit} it balances for {SECONDS} s"),
-                };
-                let why = format!("{}; {}", said(answer, &here), said(answer + step, &further));
-                (here.is_none() && further.is_some(), why)
+                // What a wrong answer would do is not said: halving the range would find the answer without a look.
+                match (here, further) {
+                    (None, Some((_, fault))) => {
+                        let further = answer + step;
+                        let why = format!(
+                            "with {answer} {unit} it balances for {SECONDS} s; with {further} {unit} the motor is turned off (fault: {fault})"
+                        );
+                        (true, why)
+                    }
+                    _ => (false, format!("{answer} {unit} is not the last value with which it balances")),
+                }
             }
             Self::Fault { defect, sensor } => {
                 let [answer] = numbers(answer)?;

@@ -39,6 +39,7 @@ pub mod image;
 pub mod import;
 pub mod in_the_loop;
 pub mod monitor;
+mod policy;
 pub mod project;
 pub mod report;
 pub mod reproduce;

@@ -9,6 +9,9 @@ use upright_design::table::TableValues;
 
 use super::property::Properties;
 
+/// Most links of a chain that stands while a person goes on pulling one of them.
+const FEW_LINKS: usize = 2;
+
 /// The rig, its limits, and what can be done with it. `defects` are those that can begin; none if it is a real machine.
 pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Defect]>) -> Value {
     let is_simulated = defects.is_some();
@@ -38,6 +41,7 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "is_simulated": is_simulated,
         "has_swing_up": table.swing_up.is_some(),
         "tick_s": rig.tick.period_s,
+        "falls_when_held": lengths.len() > FEW_LINKS,
         "lengths_m": lengths,
         "travel_m": travel,
         "soft_m": table.limits.rail_m,

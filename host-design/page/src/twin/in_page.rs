@@ -200,7 +200,7 @@ fn heard(
 ) -> Result<(), HarnessError> {
     match request {
         // The only viewer is always in command.
-        PageRequest::Alive | PageRequest::Command | PageRequest::Release => Ok(()),
+        PageRequest::Alive {} | PageRequest::Command {} | PageRequest::Release {} => Ok(()),
         PageRequest::Say { line } => {
             console.say(&line, world.now());
             Ok(())
@@ -305,6 +305,34 @@ mod tests {
                 }
                 assert_eq!(state, "Fault", "{rig} {name}");
             }
+        }
+    }
+
+    /// Whether the rig falls while its last link is pulled to the side for four seconds.
+    fn falls_when_pulled(page: &mut Page, hello: &Value, by_m: f64) -> bool {
+        page.run(&[]);
+        let lengths = hello["lengths_m"].as_array().unwrap();
+        let reach_m: f64 = lengths.iter().filter_map(Value::as_f64).sum();
+        let pull = json!({ "do": "pull", "body": lengths.len(), "along": 1.0, "x": by_m, "y": reach_m });
+        let mut state = page.state_after(&pull);
+        for _ in 0..3 {
+            state = last_state(&page.run(&[]));
+        }
+        state == "Fault"
+    }
+
+    #[test]
+    fn the_page_is_told_whether_a_pull_that_is_held_fells_the_rig() {
+        for (rig, falls) in [
+            ("single-quanser-ip02", false),
+            ("double-quanser-dbpen", false),
+            ("triple-glueck-eder-kugi", true),
+            ("quadruple-paper", true),
+        ] {
+            let mut page = Page::default();
+            let hello = page.start(rig, true);
+            assert_eq!(hello["falls_when_held"], falls, "{rig}");
+            assert_eq!(falls_when_pulled(&mut page, &hello, 0.006), falls, "{rig}");
         }
     }
 

@@ -2,16 +2,16 @@
 
 use serde::Deserialize;
 
-/// A message of the page.
+/// A message of the page. Messages without parameters are written with braces: serde refuses unknown fields only there.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum PageRequest {
     /// Nothing: shows that the page is alive.
-    Alive,
+    Alive {},
     /// To be in command, if nobody else is.
-    Command,
+    Command {},
     /// To give up command.
-    Release,
+    Release {},
     /// A command to the firmware, in the words of the monitor: `arm`, `set-point 0.05`.
     Say {
         /// The command.
@@ -45,7 +45,7 @@ pub enum MachineRequest {
         y: f64,
     },
     /// Lets go of what is pulled.
-    LetGo,
+    LetGo {},
     /// Holds the rig by hand.
     Hold {
         /// How.
@@ -104,4 +104,35 @@ pub enum Holding {
     Guided,
     /// Holds all links upright.
     Upright,
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_message_with_an_unknown_field_is_refused_whatever_it_asks() {
+        let machine = |what: serde_json::Value| json!({ "ask": "machine", "what": what });
+        let messages = [
+            json!({ "ask": "alive" }),
+            json!({ "ask": "command" }),
+            json!({ "ask": "release" }),
+            json!({ "ask": "say", "line": "arm" }),
+            json!({ "ask": "record", "on": true }),
+            machine(json!({ "do": "let-go" })),
+            machine(json!({ "do": "pause", "on": true })),
+        ];
+        for message in messages {
+            assert!(serde_json::from_value::<PageRequest>(message.clone()).is_ok(), "{message}");
+            for place in [&[][..], &["what"]] {
+                let mut other = message.clone();
+                let object = place.iter().try_fold(&mut other, |inner, name| inner.get_mut(name));
+                let Some(object) = object else { continue };
+                object["x"] = json!(1);
+                assert!(serde_json::from_value::<PageRequest>(other.clone()).is_err(), "{other}");
+            }
+        }
+    }
 }

@@ -178,7 +178,7 @@ impl<'a, 't> World<'a, 't> {
             MachineRequest::Pull { body, along, x, y } => {
                 self.pulled = Some(PulledPoint { body, along, to: [x, y] });
             }
-            MachineRequest::LetGo => self.pulled = None,
+            MachineRequest::LetGo {} => self.pulled = None,
             MachineRequest::Hold { how } => self.hold.take(how, self.harness.bench.state()),
             MachineRequest::Set { name, value } => match self.properties.set(&name, value) {
                 Some(true) => self.rebuild()?,

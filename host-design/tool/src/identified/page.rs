@@ -4,6 +4,7 @@ use askama::Template;
 
 use super::text::{notes, row_texts, window_rows, windows};
 use crate::figure::{Axis, COLOURS_CSS, Curve, Figure, Panel, style_sheet};
+use crate::policy;
 use crate::report::{Plot, ReportError};
 use upright_design::identify::{ChannelFit, Identification, Predicted, Settings};
 use upright_design::number::significant;
@@ -28,6 +29,7 @@ struct Page<'a> {
     correlations: Vec<CorrelationRow>,
     notes: Vec<String>,
     version: &'static str,
+    policy: String,
     style: String,
 }
 
@@ -50,6 +52,7 @@ pub fn page(
 ) -> Result<String, ReportError> {
     let has_fit = !found.channels.is_empty();
     let plot = |figure: Figure, title: &str| Plot::of(&figure, title.to_owned());
+    let style = format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("../report/page.css"));
     let page = Page {
         name,
         command,
@@ -75,7 +78,8 @@ pub fn page(
         correlations: correlations(found),
         notes: if has_fit || !found.is_driven { notes(found, settings) } else { Vec::new() },
         version: env!("CARGO_PKG_VERSION"),
-        style: format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("../report/page.css")),
+        policy: policy::of_document(None, &style),
+        style,
     };
     Ok(page.render()?)
 }

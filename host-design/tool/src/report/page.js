@@ -1,4 +1,17 @@
 "use strict";
+// What is folded is opened where a link leads, and on paper.
+(() => {
+  const openAround = () => {
+    const target = location.hash.length > 1 ? document.getElementById(location.hash.slice(1)) : null;
+    const folded = target?.closest("details");
+    if (!folded || folded.open) return;
+    folded.open = true;
+    target.scrollIntoView();
+  };
+  addEventListener("hashchange", openAround);
+  openAround();
+  addEventListener("beforeprint", () => { for (const folded of document.querySelectorAll("details")) folded.open = true; });
+})();
 // Plays the runs: one time for the animation and for the cursors of all plots.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
@@ -161,6 +174,7 @@
   });
   choice.addEventListener("change", () => {
     scene = data.scenes[Number(choice.value)];
+    document.querySelectorAll(".scene > details")[Number(choice.value)]?.setAttribute("open", "");
     setStage();
     seek(0);
   });

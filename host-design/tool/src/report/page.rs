@@ -12,6 +12,7 @@ use super::runs::{LawRun, Scene, laws};
 use super::trust::{CheckRow, TrustRow, check_rows, trust_rows};
 use super::{ReportError, ReportSource};
 use crate::figure::{COLOURS_CSS, style_sheet};
+use crate::policy;
 use upright_design::design::{DesignPoles, Feedback};
 use upright_design::rig::{CartInput, PlantDescription, Rig};
 use upright_design::verify::{Certificate, Disturbance};
@@ -57,9 +58,14 @@ pub(super) struct ReportPage<'a> {
     version: &'static str,
     command: &'a str,
     animation: String,
+    /// Content security policy: only the style and the script of the page.
+    policy: String,
     style: String,
     script: &'static str,
 }
+
+/// What plays the runs.
+const SCRIPT: &str = include_str!("page.js");
 
 /// A scenario with its plots.
 pub(super) struct SceneEntry {
@@ -111,6 +117,7 @@ impl<'a> ReportPage<'a> {
         let names = state_names(rig);
         let observer = design.kalman.as_ref().filter(|_| table.observer.is_some());
         let checks = check_rows(trust);
+        let style = format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("page.css"));
         Ok(Self {
             name: &rig.name,
             hash: format!("{:016x}", rig.hash()),
@@ -154,8 +161,9 @@ impl<'a> ReportPage<'a> {
             version: env!("CARGO_PKG_VERSION"),
             command: source.command,
             animation: Animation::of(rig, scenes).json()?,
-            style: format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("page.css")),
-            script: include_str!("page.js"),
+            policy: policy::of_document(Some(SCRIPT), &style),
+            style,
+            script: SCRIPT,
         })
     }
 

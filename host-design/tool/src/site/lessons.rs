@@ -48,7 +48,7 @@ fn value(from: &TomlValue) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use upright_page::Desk;
+    use upright_page::{Desk, Exercise};
 
     const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
@@ -69,6 +69,12 @@ mod tests {
                 "{title}: {right} {wrong}"
             );
             assert!(mark(&[])["failed"]["why"].as_str().unwrap().starts_with("give "), "{title}");
+            if let Exercise::Property { .. } = exercise {
+                // Too small and too large are told alike.
+                let (small, large) = (mark(&[0.5]), mark(&[90.5]));
+                let told = |marked: &Value| marked["why"].as_str().unwrap().to_owned();
+                assert_eq!(told(&small).replace("0.5", "90.5"), told(&large), "{title}");
+            }
         }
     }
 

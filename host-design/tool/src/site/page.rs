@@ -2,24 +2,29 @@
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 use upright::protocol::BAUD;
 use upright_page::Lesson;
 
 use super::motions::without_knots;
 use super::packed::packed;
-use super::twin::{TwinPage, bare};
+use super::twin::{TwinPage, bare, file};
 use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
+use crate::policy::{base64, source};
 
 const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
 const WORKER: &str =
     concat!(include_str!("page/worker.js"), include_str!("page/running.js"), include_str!("page/talking.js"));
-const SCRIPTS: [&str; 10] = [
+/// What the desk has of the twin's page.
+const SHARED: [&str; 2] = ["scale.js", "words.js"];
+const SCRIPTS: [&str; 13] = [
     include_str!("page/lzma.js"),
     include_str!("page/link.js"),
+    include_str!("page/sharing.js"),
     include_str!("page/motions.js"),
     include_str!("page/drawing.js"),
+    include_str!("page/number.js"),
+    include_str!("page/past.js"),
     include_str!("page/editor.js"),
     include_str!("page/serial.js"),
     include_str!("page/balance.js"),
@@ -46,7 +51,8 @@ pub struct Example {
 pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
-    let script = bare(&format!("'use strict';\n{{\n{}}}\n", SCRIPTS.concat()));
+    let shared: String = SHARED.map(|name| file(name).replace("export ", "")).concat();
+    let script = bare(&format!("'use strict';\n{{\n{shared}{}}}\n", SCRIPTS.concat()));
     let twin = TwinPage::new();
     // A document inside the page has its policy.
     let policy = format!(
@@ -102,38 +108,9 @@ fn embedded(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default().replace("</", "<\\/")
 }
 
-/// The hash by which a content security policy names a script or style.
-fn source(text: &str) -> String {
-    format!("sha256-{}", base64(&Sha256::digest(text)))
-}
-
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let word =
-            three.iter().enumerate().fold(0, |word, (i, &byte)| word | u32::from(byte) << (16 - 8 * i));
-        for place in 0..4 {
-            let letter = char::from(LETTERS[(word >> (18 - 6 * place) & 63) as usize]);
-            text.push(if place <= three.len() { letter } else { '=' });
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bytes_have_the_letters_of_the_standard() {
-        // RFC 4648, section 10.
-        for (bytes, text) in
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
-        {
-            assert_eq!(base64(bytes.as_bytes()), text);
-        }
-    }
 
     #[test]
     fn the_page_holds_all_of_its_parts_and_asks_for_nothing() {

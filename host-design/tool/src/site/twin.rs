@@ -4,8 +4,10 @@ use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::twin::assets::{ASSETS, Asset};
 
 /// The modules of its script, each after those that it imports.
-const MODULES: [&str; 9] = [
+const MODULES: [&str; 11] = [
     "colours.js",
+    "scale.js",
+    "words.js",
     "link.js",
     "guide.js",
     "history.js",
@@ -58,7 +60,7 @@ pub(super) fn bare(script: &str) -> String {
 }
 
 /// The content of a file of the twin's page.
-fn file(name: &str) -> &'static str {
+pub(super) fn file(name: &str) -> &'static str {
     ASSETS.iter().find(|asset: &&Asset| asset.name == name).map_or("", |asset| asset.content)
 }
 

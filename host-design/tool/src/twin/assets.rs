@@ -16,12 +16,14 @@ pub(crate) struct Asset {
 const SCRIPT: &str = "text/javascript";
 
 /// All files of the page.
-pub(crate) const ASSETS: [Asset; 12] = [
+pub(crate) const ASSETS: [Asset; 14] = [
     Asset { name: "", media_type: "text/html", content: include_str!("page/page.html") },
     Asset { name: "colours.css", media_type: "text/css", content: COLOURS_CSS },
     Asset { name: "page.css", media_type: "text/css", content: include_str!("page/page.css") },
     Asset { name: "main.js", media_type: SCRIPT, content: include_str!("page/main.js") },
     Asset { name: "colours.js", media_type: SCRIPT, content: include_str!("page/colours.js") },
+    Asset { name: "scale.js", media_type: SCRIPT, content: include_str!("page/scale.js") },
+    Asset { name: "words.js", media_type: SCRIPT, content: include_str!("page/words.js") },
     Asset { name: "link.js", media_type: SCRIPT, content: include_str!("page/link.js") },
     Asset { name: "guide.js", media_type: SCRIPT, content: include_str!("page/guide.js") },
     Asset { name: "history.js", media_type: SCRIPT, content: include_str!("page/history.js") },

@@ -65,9 +65,9 @@ impl Dispatcher {
                     self.take_command(viewer);
                 }
                 ViewerEvent::Went if commands => self.commander = None,
-                ViewerEvent::Went | ViewerEvent::Asks(PageRequest::Alive) => {}
-                ViewerEvent::Asks(PageRequest::Command) => self.take_command(viewer),
-                ViewerEvent::Asks(PageRequest::Release) if commands => self.commander = None,
+                ViewerEvent::Went | ViewerEvent::Asks(PageRequest::Alive {}) => {}
+                ViewerEvent::Asks(PageRequest::Command {}) => self.take_command(viewer),
+                ViewerEvent::Asks(PageRequest::Release {}) if commands => self.commander = None,
                 // Anyone who sees danger may turn the motor off.
                 ViewerEvent::Asks(PageRequest::Say { line }) if commands || line == "disarm" => {
                     self.console.say(&line, now)

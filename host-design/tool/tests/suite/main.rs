@@ -40,6 +40,8 @@ mod serial_errors;
 mod shaken;
 mod site_at_length;
 mod site_bits;
+mod site_desk;
+mod site_exercises;
 mod site_pace;
 mod site_page;
 mod site_serial;
@@ -53,6 +55,7 @@ mod twin_access;
 mod twin_guide;
 mod twin_page;
 mod twin_reload;
+mod twin_words;
 mod verify_command;
 mod virtual_board;
 

@@ -18,6 +18,7 @@ const TELEPHONE: u32 = 390;
 const GEOMETRY: &str =
     "[...document.querySelectorAll('.stage line, .stage circle')].map((e) => e.outerHTML).join()";
 const CURSORS: &str = "[...document.querySelectorAll('.cursor')].map((line) => line.getAttribute('x1'))";
+const UNFOLD: &str = "document.querySelectorAll('details').forEach((folded) => { folded.open = true; })";
 /// Waits for some frames, in which a running animation moves on.
 const WAIT: &str = "new Promise((done) => { let frames = 12; \
                     const next = () => { frames -= 1; frames ? requestAnimationFrame(next) : done(); }; next(); })";
@@ -99,6 +100,7 @@ fn on_a_telephone(browser: &mut Browser, page: &Path, light: &Value) -> Vec<Stri
     let mut faults = Vec::new();
     let mut check = |holds: bool, fault: &str| require(&mut faults, holds, fault);
     browser.open(page, TELEPHONE, "dark", "screen");
+    browser.value(UNFOLD);
     let width = browser.value("document.documentElement.scrollWidth").as_u64();
     check(width.is_some_and(|width| width <= u64::from(TELEPHONE)), "it scrolls sideways on a telephone");
     let smallest = "Math.min(...[...document.querySelectorAll('svg.plot text')].map((t) => t.getBoundingClientRect().height))";
@@ -125,6 +127,68 @@ fn on_paper(browser: &mut Browser, page: &Path, light: &Value) -> Vec<String> {
     let controls = browser.value("getComputedStyle(document.querySelector('.controls')).display");
     check(controls == "none", "it prints its buttons");
     faults
+}
+
+/// The page without its content security policy.
+fn without_policy(html: &str) -> String {
+    let begin = html.find("<meta http-equiv=\"Content-Security-Policy\"").expect("a policy");
+    let end = begin + html[begin..].find('\n').unwrap() + 1;
+    [&html[..begin], &html[end..]].concat()
+}
+
+/// The verdict and every requirement come first, the rest is folded, and what stays in sight while one scrolls is small.
+fn a_person_sees_the_verdict_first(browser: &mut Browser, page: &Path) {
+    for width in [TELEPHONE, 1200] {
+        browser.open(page, width, "light", "screen");
+        let bottom = "document.querySelector('.verdict').getBoundingClientRect().bottom < 844";
+        assert_eq!(browser.value(bottom), true, "{width}");
+        let first = "document.querySelector('main > *').id";
+        assert_eq!(browser.value(first), "trust");
+        let height = browser.value("document.documentElement.scrollHeight").as_f64().unwrap();
+        assert!(height < 7000.0, "{width}: {height} px");
+        browser.value(UNFOLD);
+        browser.value("document.getElementById('run-tilt').scrollIntoView()");
+        let stays = browser.value(
+            "[...document.querySelectorAll('main *')].filter((part) => getComputedStyle(part).position === 'sticky') \
+             .reduce((sum, part) => sum + part.getBoundingClientRect().height, 0)",
+        );
+        assert!(stays.as_f64().is_some_and(|height| height < 0.15 * 844.0), "{width}: {stays} px");
+        // A link leads into what is folded.
+        browser.value("document.querySelectorAll('details').forEach((folded) => { folded.open = false; })");
+        browser.value("document.querySelector('nav a[href=\"#gains\"]').click()");
+        browser.value(WAIT);
+        let shown = "(({ top }) => Math.abs(top) < 200)(document.getElementById('gains').getBoundingClientRect()) \
+                     && document.getElementById('gains').closest('details').open";
+        assert_eq!(browser.value(shown), true, "{width}");
+    }
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// The page's policy stops scripts and styles that are not its own, and asks nobody.
+fn nothing_else_is_let_in(browser: &mut Browser, page: &Path, html: &str) {
+    for foreign in [
+        "<script>document.body.dataset.foreign = 1</script></body>",
+        "<script src=\"https://upright.invalid/x.js\"></script></body>",
+        "<img src=\"https://upright.invalid/x.png\"></body>",
+        "<style>body { --foreign: 1 }</style></body>",
+    ] {
+        std::fs::write(page, html.replace("</body>", foreign)).unwrap();
+        browser.open(page, 1200, "light", "screen");
+        let errors = browser.errors();
+        assert!(
+            errors.iter().any(|error| error.contains("Content Security Policy")),
+            "{foreign}: {errors:?}"
+        );
+        let is_in = "document.body.dataset.foreign === '1' || getComputedStyle(document.body).getPropertyValue('--foreign') !== ''";
+        assert_eq!(browser.value(is_in), false, "{foreign}");
+    }
+    // Negative control: without the policy, the script runs.
+    let open =
+        without_policy(html).replace("</body>", "<script>document.body.dataset.foreign = 1</script></body>");
+    std::fs::write(page, open).unwrap();
+    browser.open(page, 1200, "light", "screen");
+    assert_eq!(browser.value("document.body.dataset.foreign"), "1");
+    std::fs::write(page, html).unwrap();
 }
 
 #[test]
@@ -155,6 +219,11 @@ fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
     let html = &SINGLE.html;
     std::fs::write(&page, html).unwrap();
     assert_eq!(faults(&mut browser, &page, true), Vec::<String>::new());
+    a_person_sees_the_verdict_first(&mut browser, &page);
+    nothing_else_is_let_in(&mut browser, &page, html);
+    // The negative controls put scripts and styles into the page.
+    let html = &without_policy(html);
+    std::fs::write(&page, html).unwrap();
     browser.open(&page, 1200, "light", "screen");
     let light = browser.value("getComputedStyle(document.body).backgroundColor");
 

@@ -41,7 +41,7 @@ fn a_rig_gets_a_whole_page_that_needs_nothing_else() {
     let html = &report.html;
     assert!(html.len() < LARGEST, "{}", html.len());
     let sections =
-        ["runs", "rig", "model", "poles", "gains", "frequency", "region", "cost", "trust", "provenance"];
+        ["trust", "runs", "rig", "model", "poles", "gains", "frequency", "region", "cost", "provenance"];
     assert_eq!(ids(html), sections);
     // The address of a namespace is only a name; no browser opens it.
     let addresses = html.replace("http://www.w3.org/2000/svg", "");

@@ -69,15 +69,25 @@ pub(crate) fn opened_in(width: u32) -> Option<(Browser, tempfile::TempDir)> {
     browser.open(&file, width, "light", "screen");
     until(&mut browser, "upright.desk.design && upright.desk.poles");
     eprintln!(
-        "page: opened, with gains and poles of four links, after {:.2} s",
+        "page: opened, with gains and poles of a single link, after {:.2} s",
         begin.elapsed().as_secs_f64()
     );
     Some((browser, folder))
 }
 
+/// Puts an example on the desk.
+pub(crate) fn begin_with(browser: &mut Browser, rig: &str) {
+    browser.value(&format!(
+        "{{ const example = document.getElementById('example'); example.value = '{rig}'; \
+         example.dispatchEvent(new Event('change')); }}"
+    ));
+    until(browser, &format!("upright.desk.design?.rig === '{rig}' && upright.desk.poles"));
+}
+
 #[test]
 fn a_rig_is_designed_and_exported_in_the_page_as_on_the_command_line() {
     let Some((mut browser, _folder)) = opened() else { return };
+    begin_with(&mut browser, "quadruple-paper");
     let gains = browser.value("document.getElementById('gains').textContent");
     assert!(gains.as_str().unwrap().contains("3.16228  3.68443  −14.6001  −5.75422"), "{gains}");
     let rig = root().join("rigs/quadruple-paper.toml");
@@ -154,6 +164,7 @@ fn an_answer_to_an_exercise_is_marked_in_the_page() {
 #[test]
 fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
     let Some((mut browser, _folder)) = opened() else { return };
+    begin_with(&mut browser, "quadruple-paper");
     let toml = std::fs::read_to_string(root().join("rigs/quadruple-paper.toml")).unwrap();
     let wrong = toml.replace("force_weight", "force_wait");
     let line = wrong.lines().position(|line| line.starts_with("force_wait")).unwrap() + 1;

@@ -7,7 +7,7 @@ use upright_page::twin::InPage;
 
 use crate::report_devtools::Browser;
 use crate::site_bits::{in_node, is_wanted, late_rig};
-use crate::site_page::{opened, root, type_in, until as until_designed};
+use crate::site_page::{begin_with, opened, root, type_in, until as until_designed};
 use crate::twin_page::{
     FASTEST, MACHINE, STATE, catch_and_calibrate, click, let_pass, pull, set_speed, until, until_done,
     until_state,
@@ -140,6 +140,7 @@ fn unlike(csv: &str, drawn: &[Value]) -> Option<String> {
 #[test]
 fn the_papers_rig_is_balanced_pulled_broken_and_put_back_in_the_page() {
     let Some((mut browser, _folder)) = opened() else { return };
+    begin_with(&mut browser, "quadruple-paper");
     balance(&mut browser, true);
     until_state(&mut browser, "Balancing");
     let_pass(&mut browser, 1.0);

@@ -164,7 +164,8 @@ fn garbage_and_floods_end_the_connection_and_nothing_else() {
     let twin = Twin::start("single-quanser-ip02", &[]);
     let mut first = page(&twin);
     read_until(&mut first, true, balancing);
-    for garbage in ["{", "{\"ask\":\"fly\"}", "[1,2,3]", &"x".repeat(100_000)] {
+    for garbage in ["{", "{\"ask\":\"fly\"}", "{\"ask\":\"alive\",\"x\":1}", "[1,2,3]", &"x".repeat(100_000)]
+    {
         let mut other = page(&twin);
         let _ = other.send(Message::text(garbage));
         let ended = (0..10_000).find_map(|_| match other.read() {

@@ -5,7 +5,8 @@ const SCOPES = 'upright scopes';
 
 class Twin {
   constructor(module, failed) {
-    Object.assign(this, { module, failed, frame: null, thread: null, line: null, kept: null });
+    // `falls` are the faults that a person has seen in this page, each with what was not as designed.
+    Object.assign(this, { module, failed, frame: null, thread: null, line: null, kept: null, falls: [] });
     addEventListener('pagehide', () => this.keep());
     byId('close').addEventListener('click', () => this.close());
     // Stop works wherever the focus is.
@@ -31,6 +32,7 @@ class Twin {
     byId('twin').append(this.frame);
     this.thread = new Thread(this.module);
     this.thread.keep = (changes) => { this.kept = { rig, kept: changes }; };
+    this.thread.fell = (fall) => { this.falls.push({ toml: rig.toml, ...fall }); };
     this.thread.run({ rig, kept }, JSON.parse(embedded('theme')), there, line?.there ?? null, ({ failed }) => {
       if (failed === undefined) return;
       this.close();
@@ -48,13 +50,18 @@ class Twin {
 
   // Goes on with what was kept, if it is of the rig file `toml`.
   goOn(toml) {
-    const { rig, kept } = JSON.parse(store()?.getItem(RUN) ?? 'null') ?? {};
-    if (rig?.toml === toml) this.open(rig, null, { ...kept, bytes: bytesOfLetters(kept.bytes) });
+    try {
+      const { rig, kept } = JSON.parse(store()?.getItem(RUN) ?? 'null') ?? {};
+      if (rig?.toml === toml) this.open(rig, null, { ...kept, bytes: bytesOfLetters(kept.bytes) });
+    } catch { store()?.removeItem(RUN); } // damaged
   }
 
   show(isShown) {
     byId('twin').hidden = !isShown;
     for (const place of document.querySelectorAll('main, header, #told')) place.hidden = isShown;
+    // An exercise is answered while one looks; its text is folded then.
+    byId(isShown ? 'twin' : 'lesson-place').append(byId('lesson'));
+    byId('lesson').querySelector('details').open = !isShown;
   }
 
   close() {

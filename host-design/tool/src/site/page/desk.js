@@ -3,24 +3,30 @@
 const examples = JSON.parse(embedded('examples'));
 const DEGREES = 180 / Math.PI;
 const LEAST_MS = 16;
+const FIRST = 'single-quanser-ip02'; // where a person begins who has no rig
 const KEPT = 'upright rig'; // name in the tab's store
+const LARGEST_FILE = 1e6; // bytes
 const NEEDS_TABLE = ['save-table', 'save-header', 'save-csv', 'balance', 'connect', 'verify'];
+const SHOWN = ['drawing', 'plots', 'figures', 'gains', 'poles'];
 
-const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, error: null };
+// `linked` is the rig file that the address holds.
+const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, linked: null };
 let checker = null;
 let designer = null;
 let twin = null;
 let trust = null;
 
 const editor = new Editor(() => changed());
-const set = (key, value) => {
-  checker.ask('set', { ask: 'set', toml: editor.value, key, value }, (answer) => {
-    if (answer.failed !== undefined) return editor.mark(answer.failed);
-    editor.set(answer.toml);
-    return changed();
+const set = (key, value, refuse) => {
+  checker?.ask('set', { ask: 'set', toml: editor.value, key, value }, (answer) => {
+    if (answer.failed === undefined) {
+      editor.set(answer.toml, key);
+      return changed();
+    }
+    return refuse === undefined ? wrong(answer.failed) : refuse(answer.failed.why);
   });
 };
-const form = new Form(set);
+const form = new Form(set, (why) => outdate(why));
 const weights = new Weights(set);
 
 function tell(text, isBad = false) {
@@ -28,32 +34,65 @@ function tell(text, isBad = false) {
   byId('told').classList.toggle('bad', isBad);
 }
 
+// Says something that stays until the rig is changed; with `undoes`, beside a button that takes the last change back.
+function notice(text, { isBad = false, undoes = false } = {}) {
+  byId('notice').hidden = text === '';
+  byId('notice').classList.toggle('bad', isBad);
+  const undo = element('button', { type: 'button', textContent: 'undo' });
+  undo.addEventListener('click', (event) => editor.step(event, true));
+  byId('notice').replaceChildren(text, ...(undoes ? [undo] : []));
+}
+
+// What is shown is not of the rig that is wanted; `why` says what is wrong with that one.
+function outdate(why) {
+  for (const id of SHOWN) byId(id).classList.add('old');
+  for (const id of NEEDS_TABLE) byId(id).disabled = true;
+  byId('verdict').className = 'bad';
+  byId('verdict').replaceChildren(...inPieces(why));
+  byId('figures').textContent = 'What is drawn is the rig before.';
+  byId('unusual').replaceChildren();
+  tell('');
+}
+
+// The rig file cannot be designed.
+function wrong(failed) {
+  editor.mark(failed);
+  outdate(`${placeOf(failed)}${failed.why}`);
+}
+
 function changed() {
+  notice('');
+  if (checker === null) return;
+  // An address that holds another rig would win over this one when the page is loaded again.
+  if (desk.linked !== null && editor.value !== desk.linked) {
+    desk.linked = null;
+    history.replaceState(null, '', withoutRig());
+  }
   trust.forget();
   checker.ask('check', { ask: 'check', toml: editor.value }, checked);
 }
 
 function checked(answer) {
-  editor.mark(answer.failed);
+  if (answer.failed !== undefined) return wrong(answer.failed);
+  editor.mark(undefined);
   for (const id of NEEDS_TABLE) byId(id).disabled = true;
-  if (answer.failed !== undefined) return;
   desk.sketch = answer;
-  byId('unusual').replaceChildren(...answer.unusual.map((text) => element('li', { textContent: text })));
   form.show(answer.fields);
   weights.show(answer.weights);
   draw();
-  redesign();
+  return redesign();
 }
 
 // How the closed loop is disturbed in the run that is shown.
 const disturbed = () => ({ lean_rad: Number(byId('lean').value) / DEGREES, step_m: Number(byId('step').value) });
 
 function redesign() {
-  for (const id of ['plots', 'gains', 'poles']) byId(id).classList.add('old');
+  for (const id of ['plots', 'gains', 'poles', 'figures']) byId(id).classList.add('old');
+  byId('verdict').className = '';
   const toml = editor.value;
   tell('designing …');
   designer.ask('design', { ask: 'design', toml, ...disturbed() }, (answer, ms) => {
-    if (answer.failed !== undefined) return tell(answer.failed.why, true);
+    if (answer.failed !== undefined) return toml === editor.value ? wrong(answer.failed) : undefined;
     designed(answer, ms);
     return designer.ask('poles', { ask: 'poles', toml }, (poles) => {
       if (poles.failed !== undefined) return;
@@ -70,11 +109,18 @@ function designed(answer, ms) {
   if ([...law.options].map(({ value }) => value).join() !== names.join()) {
     law.replaceChildren(...answer.laws.map(({ law: value, title }) => element('option', { value, textContent: title })));
   }
-  const table = answer.crc === null ? `no table: ${answer.no_table}` : `table ${answer.crc}`;
-  tell(`${answer.states} states; every gain equal at ${answer.bits[0]} and ${answer.bits[1]} bits; ${table}; designed and run in ${(ms / 1e3).toFixed(2)} s`);
+  if (answer.crc === null) tell(`no table: ${plain(answer.no_table)}`, true);
+  else tell(`designed and run in ${(ms / 1e3).toFixed(2)} s`);
   for (const id of NEEDS_TABLE) byId(id).disabled = answer.crc === null;
   showLoop();
   showDesign();
+}
+
+// What the run shows, in plain words.
+function inWords({ fell }) {
+  const what = desk.sketch.lengths_m.length > 0 ? 'It stays upright' : 'It survives';
+  if (fell) return 'It falls.';
+  return desk.sketch.unusual.length === 0 ? `${what}.` : `${what}, if its numbers are right:`;
 }
 
 const chosen = () => desk.design?.laws.find(({ law }) => law === byId('law').value) ?? desk.design?.laws[0];
@@ -84,11 +130,12 @@ function showLoop() {
   const verdict = byId('verdict');
   const run = law?.run ?? null;
   const said = law === undefined ? 'the rig file asks for no control law: add [lqr] or [pole_placement]' : run?.summary ?? '';
-  const [first, ...figures] = said.split('\n').map((line) => line.trim());
-  verdict.textContent = first;
-  byId('figures').textContent = figures.join('; ');
-  verdict.className = run === null ? '' : run.fell ? 'bad' : 'good';
-  byId('plots').classList.remove('old');
+  const { unusual } = desk.sketch;
+  verdict.textContent = run === null ? said : inWords(run);
+  verdict.className = run === null || (unusual.length > 0 && !run.fell) ? '' : run.fell ? 'bad' : 'good';
+  byId('unusual').replaceChildren(...unusual.map((text) => element('li', {}, ...inPieces(text))));
+  byId('figures').textContent = run === null ? '' : said.split('\n').map((line) => line.trim()).join('; ');
+  for (const id of ['drawing', 'plots', 'figures']) byId(id).classList.remove('old');
   byId('play').disabled = run === null;
   if (run === null) return byId('plots').replaceChildren();
   const links = desk.sketch.lengths_m.length;
@@ -131,6 +178,7 @@ function showDesign() {
   row('spectral radius', `${law.radius.toFixed(6)} at the tick of ${short(desk.design.tick_s * 1e3)} ms, rounded to f32`);
   row('rounding to f32', `changes no gain by more than ${law.rounding.toExponential(1)}, relative`);
   row('certificate', `every gain equal at ${desk.design.bits[0]} and ${desk.design.bits[1]} bits, rounded once`);
+  if (desk.design.crc !== null) row('gain table', `CRC-32 ${desk.design.crc}`, 'code');
   byId('gains').replaceChildren(element('h3', { textContent: law.title }), element('table', {}, element('tbody', {}, ...rows)));
   const poles = desk.poles?.laws.find(({ law: name }) => name === law.law)?.continuous ?? null;
   if (poles === null) return undefined;
@@ -190,31 +238,66 @@ function motions() {
   return example === undefined ? null : motionsOf(example);
 }
 
-// The rig in the address, behind the mark that is never sent to a server.
-function linkToRig() {
-  const code = lettersOf(new TextEncoder().encode(editor.value)).replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
-  return `${location.href.split('#')[0]}#rig=${code}`;
+// Puts another rig file on the desk. The one before can be brought back, which is said if a person has worked on it.
+function replace(toml, what) {
+  if (toml === editor.value) return changed();
+  const isOwn = editor.value.trim() !== '' && !examples.some((example) => example.toml === editor.value);
+  editor.set(toml, what);
+  changed();
+  return isOwn ? notice(`${what} has taken the place of your rig.`, { undoes: true }) : undefined;
 }
 
-function rigOfLink() {
-  const code = /^#rig=([A-Za-z0-9_-]+)$/.exec(location.hash)?.[1];
-  if (code === undefined) return null;
-  return new TextDecoder().decode(bytesOfLetters(code.replaceAll('-', '+').replaceAll('_', '/')));
+async function openFile(file) {
+  if (file.size > LARGEST_FILE) return notice(`${file.name} is too large for a rig file.`, { isBad: true });
+  return replace(await file.text(), file.name);
+}
+
+// The rig in the address, if there is one.
+function openLink() {
+  const link = rigOfLink();
+  if (link === null) return false;
+  if (link.why !== undefined) {
+    notice(link.why, { isBad: true });
+    return false;
+  }
+  desk.linked = link.toml;
+  replace(link.toml, 'The rig of the link');
+  return true;
+}
+
+function listenToFiles() {
+  byId('file').addEventListener('change', async ({ target }) => {
+    if (target.files.length > 0) await openFile(target.files[0]);
+    target.value = '';
+  });
+  const isOver = (is) => document.body.classList.toggle('dropping', is);
+  document.addEventListener('dragover', (event) => {
+    if (![...event.dataTransfer.types].includes('Files')) return;
+    event.preventDefault();
+    isOver(true);
+  });
+  document.addEventListener('dragleave', () => isOver(false));
+  document.addEventListener('drop', (event) => {
+    isOver(false);
+    const [file] = event.dataTransfer.files;
+    if (file === undefined) return;
+    event.preventDefault();
+    openFile(file);
+  });
 }
 
 function listen() {
   byId('example').replaceChildren(...examples.map(({ name }) => element('option', { value: name, textContent: name })));
   byId('example').addEventListener('change', ({ target }) => {
-    editor.set(examples.find(({ name }) => name === target.value).toml);
-    changed();
+    replace(examples.find(({ name }) => name === target.value).toml, target.value);
   });
-  byId('file').addEventListener('change', async ({ target }) => {
-    if (target.files.length === 0) return;
-    editor.set(await target.files[0].text());
-    changed();
-  });
+  listenToFiles();
   for (const [id, unit] of [['lean', '°'], ['step', 'm']]) {
-    const show = () => { byId(`${id}-value`).textContent = `${byId(id).value} ${unit}`; };
+    const show = () => {
+      const said = `${byId(id).value} ${unit}`;
+      byId(`${id}-value`).textContent = said;
+      byId(id).setAttribute('aria-valuetext', said);
+    };
     show();
     byId(id).addEventListener('input', () => { show(); redesign(); });
   }
@@ -237,11 +320,12 @@ function listen() {
   byId('save-header').addEventListener('click', () => saveExported('header', 'controller.h'));
   byId('save-csv').addEventListener('click', () => saveExported('csv', 'run.csv', 'text/csv'));
   byId('link').addEventListener('click', async () => {
-    history.replaceState(null, '', linkToRig());
+    desk.linked = editor.value;
+    history.replaceState(null, '', linkTo(editor.value));
     await navigator.clipboard?.writeText(location.href).catch(() => {});
     tell('the address of this page now holds the rig, and is in the clipboard where the browser allows it');
   });
-  addEventListener('hashchange', () => open(rigOfLink()));
+  addEventListener('hashchange', openLink);
   let resized = null;
   addEventListener('resize', () => {
     clearTimeout(resized);
@@ -249,29 +333,36 @@ function listen() {
   });
 }
 
-function open(text) {
-  if (text === null) return;
-  editor.set(text);
-  changed();
+// What the page shows first: the rig of its address, what the tab held when it was loaded before, or the first example.
+function first() {
+  const { name, toml } = examples.find((example) => example.name === FIRST) ?? examples[0];
+  byId('example').value = name;
+  if (!editor.goOn(store()?.getItem(KEPT))) editor.set(toml, null);
+  if (!openLink()) {
+    const said = byId('notice').textContent;
+    changed();
+    if (said !== '') notice(said, { isBad: true });
+  }
 }
 
 async function begin() {
-  listen();
-  const first = examples.find(({ name }) => name === 'quadruple-paper') ?? examples[0];
-  byId('example').value = first.name;
-  editor.set(rigOfLink() ?? store()?.getItem(KEPT) ?? first.toml);
-  addEventListener('pagehide', () => store()?.setItem(KEPT, editor.value));
   const module = bytesOf('module');
   checker = new Thread(module);
   designer = new Thread(module);
   trust = new Trust(module);
   twin = new Twin(module, (why) => tell(why, true));
+  listen();
+  addEventListener('pagehide', () => {
+    // A store that is too small keeps nothing.
+    try { store()?.setItem(KEPT, editor.kept()); } catch {}
+  });
   const begins = (name) => {
     byId('example').value = name;
-    open(examples.find((example) => example.name === name)?.toml ?? null);
+    const example = examples.find((one) => one.name === name);
+    if (example !== undefined) replace(example.toml, `${name}, the rig of the exercise,`);
   };
-  new Lessons(begins, (question) => designer.answerTo(question));
-  changed();
+  new Lessons(begins, (question) => designer.answerTo(question), () => twin.falls);
+  first();
   twin.goOn(editor.value);
 }
 

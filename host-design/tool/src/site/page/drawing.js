@@ -9,12 +9,6 @@ function svg(name, attributes, ...children) {
 
 const curveColour = (number) => `var(--c${number % 6})`;
 
-// 1, 2 or 5 times a power of ten, at least `size`.
-function niceStep(size) {
-  const power = 10 ** Math.floor(Math.log10(size));
-  return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= size * 0.999999);
-}
-
 const short = (value) => Number(value.toPrecision(6)).toString();
 
 // Draws the rig in a state (x, ẋ, θ_1, θ̇_1 …), seen at a fixed place with the cart in the middle.
@@ -40,7 +34,7 @@ function drawRig(place, { lengths_m: lengths, travel_m: travel }, state, setpoin
   line([Math.max(low, -far), 0], [Math.min(high, far), 0], 'var(--rule)', 4);
   for (const end of [low, high]) line([end, -0.05 * reach], [end, 0.05 * reach], 'var(--ink)', 5);
   const step = niceStep(90 / scale);
-  for (let tick = Math.ceil(-x0 / scale / step) * step; tick < x0 / scale; tick += step) {
+  for (const tick of roundValues(-x0 / scale, x0 / scale, step)) {
     const [x, y] = at([tick, 0]);
     parts.push(svg('text', { x, y: y + 32, 'text-anchor': 'middle' }, `${Number(tick.toFixed(3))} m`));
   }
@@ -83,11 +77,11 @@ function drawCurves(place, curves, rows) {
   const y = (value) => top + ((height - top - bottom) * (high - value)) / (high - low);
   const parts = [];
   const step = niceStep((high - low) / 4);
-  for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
+  for (const value of roundValues(low, high, step)) {
     parts.push(svg('line', { x1: left, x2: width - right, y1: y(value), y2: y(value), stroke: 'var(--rule)' }));
     parts.push(svg('text', { x: left - 6, y: y(value) + 4, 'text-anchor': 'end' }, Number(value.toPrecision(3)).toString()));
   }
-  for (let t = 0; t <= end; t += niceStep(end / 5)) {
+  for (const t of roundValues(0, end, niceStep(end / 5))) {
     parts.push(svg('text', { x: Math.min(x(t), width - 18), y: height - 4, 'text-anchor': 'middle' }, `${Number(t.toFixed(2))} s`));
   }
   curves.forEach(({ value, colour }) => {

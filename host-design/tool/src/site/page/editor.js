@@ -8,25 +8,74 @@ function element(name, properties, ...children) {
   return made;
 }
 
-// Line numbers beside the text; the line of an error stands out.
+// Line numbers beside the text; the line of an error stands out. Whatever changes the text, undo takes it back.
 class Editor {
   constructor(change) {
-    this.text = byId('toml');
-    this.lines = byId('lines');
-    this.wrong = null;
-    this.text.addEventListener('input', () => { this.number(); change(); });
+    Object.assign(this, { change, text: byId('toml'), lines: byId('lines'), wrong: null, past: new Past() });
+    this.last = this.text.value;
+    this.text.addEventListener('input', () => { this.note('typing'); change(); });
     this.text.addEventListener('scroll', () => { this.lines.scrollTop = this.text.scrollTop; });
+    // The browser's own undo knows nothing of texts that were not typed.
+    this.text.addEventListener('beforeinput', (event) => {
+      const isBack = { historyUndo: true, historyRedo: false }[event.inputType];
+      if (isBack !== undefined) this.step(event, isBack);
+    });
+    this.text.addEventListener('keydown', (event) => {
+      if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+      const key = event.key.toLowerCase();
+      if (key === 'z' || key === 'y') this.step(event, key === 'z' && !event.shiftKey);
+    });
+    byId('undo').addEventListener('click', (event) => this.step(event, true));
+    byId('redo').addEventListener('click', (event) => this.step(event, false));
   }
 
   get value() { return this.text.value; }
 
-  set(text) {
+  // Another text; `kind` is what changes it, null what cannot be taken back.
+  set(text, kind) {
     if (this.text.value === text) return;
     const [top, at] = [this.text.scrollTop, this.text.selectionStart];
     this.text.value = text;
     this.text.setSelectionRange(at, at);
     this.text.scrollTop = top;
+    if (kind === null) this.last = text;
+    this.note(kind);
+  }
+
+  // The text has changed.
+  note(kind) {
+    if (this.text.value !== this.last) this.past.note(this.last, kind);
+    this.last = this.text.value;
     this.number();
+    this.offer();
+  }
+
+  step(event, isBack) {
+    event.preventDefault();
+    const text = this.past.step(this.text.value, isBack);
+    if (text === null) return;
+    this.set(text, null);
+    this.change();
+  }
+
+  offer() {
+    byId('undo').disabled = this.past.before.length === 0;
+    byId('redo').disabled = this.past.after.length === 0;
+  }
+
+  // The text and what it was before, as text, from which a page that is loaded again goes on.
+  kept() { return JSON.stringify({ text: this.value, before: this.past.before, after: this.past.after }); }
+
+  // Goes on from what was kept; returns whether there was something.
+  goOn(kept) {
+    try {
+      const { text, before, after } = JSON.parse(kept);
+      if (typeof text !== 'string') return false;
+      this.set(text, null);
+      Object.assign(this.past, { before, after });
+      this.offer();
+      return true;
+    } catch { return false; }
   }
 
   number() {
@@ -45,17 +94,17 @@ class Editor {
     this.number();
     const problem = byId('problem');
     problem.hidden = failed === undefined;
-    if (failed === undefined) return;
-    const where = failed.line === null ? 'this file: ' : `line ${failed.line}: `;
-    problem.replaceChildren(element('b', { textContent: where }), failed.why);
+    if (failed !== undefined) problem.replaceChildren(element('b', { textContent: placeOf(failed) }), ...inPieces(failed.why));
   }
 }
 
-// Numbers of the rig as fields; `set` is called with the key and the new value.
+// Where an error is.
+const placeOf = ({ line }) => (line === null ? 'this file: ' : `line ${line}: `);
+
+// Numbers of the rig as fields; `set(key, value, refuse)` changes one, or says why not.
 class Form {
-  constructor(set) {
-    this.set = set;
-    this.keys = '';
+  constructor(set, refused) {
+    Object.assign(this, { set, refused, keys: '' });
   }
 
   show(fields) {
@@ -66,14 +115,29 @@ class Form {
     }
     for (const { key, value } of fields) {
       const input = byId(`field-${key}`);
+      this.say(input, '');
       if (document.activeElement !== input) input.value = value;
     }
   }
 
   field({ key, label, unit }) {
     const input = element('input', { id: `field-${key}`, type: 'text', inputMode: 'decimal', title: key });
-    input.addEventListener('change', () => this.set(key, input.value.trim()));
-    return element('label', {}, `${label} (${unit})`, input);
+    const refuse = (why) => {
+      this.say(input, why);
+      this.refused(`${label} (${unit}): ${why}`);
+    };
+    input.addEventListener('change', () => {
+      const { value, why } = numberOf(input.value);
+      if (why === undefined) this.set(key, String(value), refuse);
+      else refuse(why);
+    });
+    return element('label', {}, `${label} (${unit})`, input, element('small', {}));
+  }
+
+  // Says beside a field what is wrong with it, or nothing.
+  say(input, why) {
+    input.setAttribute('aria-invalid', why !== '');
+    input.nextElementSibling.replaceChildren(...inPieces(why));
   }
 }
 
@@ -103,8 +167,14 @@ class Weights {
         if (value > 0) input.value = Math.log10(value);
         input.dataset.value = value;
       }
-      byId(`value-${key}`).textContent = value;
+      this.say(key, value);
     }
+  }
+
+  // What the slider has is the logarithm: a screen reader is told the value.
+  say(key, value) {
+    byId(`value-${key}`).textContent = value;
+    byId(`weight-${key}`).setAttribute('aria-valuetext', value);
   }
 
   slider({ key, value, label }) {
@@ -113,10 +183,10 @@ class Weights {
     input.addEventListener('input', () => {
       const chosen = Number((10 ** Number(input.value)).toPrecision(2));
       input.dataset.value = chosen;
-      byId(`value-${key}`).textContent = chosen;
+      this.say(key, chosen);
       this.set(key, String(chosen));
     });
-    return element('label', {}, element('span', { textContent: label }), element('output', { id: `value-${key}` }), input);
+    return element('div', { className: 'slider' }, element('label', { htmlFor: input.id, textContent: label }), element('output', { id: `value-${key}` }), input);
   }
 }
 

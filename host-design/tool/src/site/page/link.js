@@ -19,6 +19,11 @@ function store() {
   try { return sessionStorage; } catch { return null; }
 }
 
+// The same for what stays when the tab is closed.
+function lastingStore() {
+  try { return localStorage; } catch { return null; }
+}
+
 // A thread that computes. Of several questions that wait, only the last of each kind is asked.
 class Thread {
   constructor(module) {
@@ -28,6 +33,7 @@ class Thread {
     this.asked = null;
     this.worker.onmessage = ({ data }) => {
       if (data.kept !== undefined) return this.keep?.(data.kept);
+      if (data.fell !== undefined) return this.fell?.(data.fell);
       const { take } = this.asked;
       this.asked = null;
       try { take(data.answer, data.ms); } finally { this.next(); }

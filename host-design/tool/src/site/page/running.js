@@ -49,7 +49,7 @@ function run(rig, theme, port, kept) {
   if (kept !== null) changes.put(kept);
   let keptAt = performance.now();
   port.postMessage({ you: told.you, hello: { ...told.hello, theme } });
-  let [asked, last, heard, tickMs, t] = [[], performance.now(), performance.now(), 0.02, 0];
+  let [asked, last, heard, tickMs, t, isFallen] = [[], performance.now(), performance.now(), 0.02, 0, false];
   port.onmessage = ({ data }) => {
     asked.push(data);
     heard = performance.now();
@@ -65,6 +65,9 @@ function run(rig, theme, port, kept) {
       const ran = ((answer.picture?.machine.t_s ?? t) - t) / told.hello.tick_s;
       if (ran > 0.5) tickMs += 0.05 * ((performance.now() - begin) / ran - tickMs);
       t = answer.picture?.machine.t_s ?? t;
+      const { fault = null, machine } = answer.picture ?? {};
+      if (fault !== null && !isFallen) postMessage({ fell: { defect: machine.defect, properties: machine.properties } });
+      isFallen = fault !== null;
     } catch (error) {
       port.postMessage({ notice: `the computation stopped (${error.message}); go back to the desk and balance it again` });
       return;

@@ -1,6 +1,7 @@
 // What a person does with buttons and keys, and what the page says.
 
 import { bodyName, newtons, STEPS } from './guide.js';
+import { inPieces, plain } from './words.js';
 
 const byId = (id) => document.getElementById(id);
 
@@ -168,7 +169,7 @@ export class Controls {
     const log = byId('log');
     for (const line of picture.log) {
       const entry = document.createElement('li');
-      entry.textContent = line;
+      entry.append(...inPieces(line));
       log.prepend(entry);
     }
     while (log.childElementCount > KEPT_LINES) log.lastElementChild.remove();
@@ -228,7 +229,7 @@ export class Controls {
     place.dataset.text = text;
     const said = (title, words) => {
       const paragraph = document.createElement('p');
-      paragraph.append(Object.assign(document.createElement('b'), { textContent: title }), words);
+      paragraph.append(Object.assign(document.createElement('b'), { textContent: title }), ...inPieces(words));
       return paragraph;
     };
     if (fault === null) return place.replaceChildren();

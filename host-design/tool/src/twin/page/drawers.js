@@ -1,5 +1,7 @@
 // The drawers: what the controller does not know, and what can be broken.
 
+import { inPieces } from './words.js';
+
 const byId = (id) => document.getElementById(id);
 
 function element(name, properties, ...children) {
@@ -54,16 +56,17 @@ export class Drawers {
 
   defect({ name, meaning, must }) {
     const button = element('button', { type: 'button' }, element('b', { textContent: words(name) }),
-      element('small', { textContent: must }), element('span', { textContent: meaning }));
+      element('small', { textContent: must }), element('span', {}, ...inPieces(meaning)));
     button.dataset.defect = name;
     button.addEventListener('click', () => this.machine({ do: 'defect', name, sensor: Number(byId('sensor').value) }));
     return button;
   }
 
   slider({ name, label, unit, low, high, step, nominal }) {
-    const [value, input] = [element('output', {}), element('input', { type: 'range', min: low, max: high, step, value: nominal, name })];
+    const id = `property-${name}`;
+    const [value, input] = [element('output', {}), element('input', { type: 'range', min: low, max: high, step, value: nominal, name, id })];
     input.addEventListener('input', () => this.machine({ do: 'set', name, value: Number(input.value) }));
-    const slider = element('label', { className: 'property' }, label, value, input);
+    const slider = element('div', { className: 'property' }, element('label', { htmlFor: id, textContent: label }), value, input);
     this.sliders.set(name, { slider, value, input, unit, nominal });
     return slider;
   }
@@ -78,7 +81,10 @@ export class Drawers {
     for (const [name, { slider, value, input, unit, nominal }] of this.sliders) {
       const now = machine.properties[name];
       const text = `${Number(now.toPrecision(4))} ${unit}`;
-      if (value.textContent !== text) value.textContent = text;
+      if (value.textContent !== text) {
+        value.textContent = text;
+        input.setAttribute('aria-valuetext', text);
+      }
       slider.classList.toggle('changed', now !== nominal);
       if (document.activeElement !== input) input.value = now;
     }

@@ -1,5 +1,7 @@
 // What the rig waits for, in one line, and the one act that goes on from there.
 
+import { plain } from './words.js';
+
 export const STEPS = ['Home', 'Check signs', 'Jog', 'Raise', 'Balance'];
 
 const AGAIN_MS = 400;
@@ -12,7 +14,7 @@ const machine = (what) => ({ ask: 'machine', what });
 const hand = (how) => machine({ do: 'hold', how });
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const begins = (list, text) => list.some((entry) => entry.startsWith(text));
-const reason = (text) => capital(text.replace(/^a link is not upright: /, ''));
+const reason = (text) => plain(capital(text.replace(/^a link is not upright: /, '')));
 
 // Whether the firmware estimates the state, whether the motor may push, and whether it knows the positions.
 export const isEstimated = ({ state }) => ['Raising', 'Balancing', 'Holding', 'Lowering'].includes(state);
@@ -20,27 +22,37 @@ export const isOn = (told) => isEstimated(told) || ['Jogging', 'Identifying'].in
 export const isHomed = ({ state, against_arming: against }) => (
   state !== 'Disarmed' && state !== 'Homing' && !begins(against, 'positions are not known'));
 
-// What a person has asked for that is not possible yet: it is carried out as soon as it is, and Stop cancels it.
+// What a person has asked for that is not possible yet: it is carried out as soon as it is, Stop cancels it, and after a
+// time it lapses, because a motor does not begin to move long after it was asked to.
 export class Wish {
   constructor(ask) {
-    Object.assign(this, { ask, name: null, since: 0, asked: 0 });
+    Object.assign(this, { ask, name: null, lapsed: null, isSimulated: false, since: 0, asked: 0 });
   }
 
   set(name, isSimulated) {
-    Object.assign(this, { name, since: performance.now(), asked: 0 });
+    Object.assign(this, { name, isSimulated, lapsed: null, since: performance.now(), asked: 0 });
     if (isSimulated) this.ask(hand(name === 'up' ? 'free' : 'upright'));
   }
 
-  cancel() { this.name = null; }
+  cancel() { Object.assign(this, { name: null, lapsed: null }); }
+
+  // For the guide: what is wished for, how long it still stands (s), and what has lapsed.
+  told() {
+    return { name: this.name, left_s: Math.ceil((LAPSES_MS - performance.now() + this.since) / 1e3), lapsed: this.lapsed };
+  }
 
   take(latest) {
     const now = performance.now();
+    if (latest.state === 'Fault' || isEstimated(latest)) this.lapsed = null;
     if (this.name === null || now - this.asked < AGAIN_MS) return;
     if (latest.state === 'Balancing' && this.name === 'arm') this.ask(hand('free'));
-    if (latest.state === 'Fault' || isEstimated(latest) || now - this.since > LAPSES_MS) return this.cancel();
+    if (latest.state === 'Fault' || isEstimated(latest)) return this.cancel();
+    if (now - this.since > LAPSES_MS) return Object.assign(this, { name: null, lapsed: this.name });
     const against = this.name === 'up' ? latest.against_swing_up : latest.against_arming;
     if (latest.state !== 'Calibrated' || against.length > 0) return;
     this.asked = now;
+    // The hand may have held it still meanwhile.
+    if (this.isSimulated && this.name === 'up') this.ask(hand('free'));
     this.ask(say(this.name));
   }
 }
@@ -87,23 +99,38 @@ function calibrated({ hello, latest, machine: told, wish }) {
     return { step: 2, line: 'The encoders count the right way', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' },
       below: now === null ? 'Hands off: while you hold the button, the motor pushes the cart by some mm, to learn its own sense.' : capital(now) };
   }
-  if (wish === 'up') return { step: 3, line: 'Will be raised as soon as it can be', below: `${reason(swing[0] ?? 'now')}. Stop cancels it.` };
-  if (wish === 'arm') return { step: 3, line: 'The hand lifts it', below: `${reason(against[0] ?? 'now')}.` };
+  const still = hello.is_simulated && told?.holding !== 'hanging' ? { text: 'Hold it still', key: 'j', asks: [hand('hanging')] } : undefined;
+  if (wish.name === 'up') {
+    return { step: 3, line: 'Will be raised as soon as it can be', act: swing.length === 0 ? undefined : still,
+      below: `${reason(swing[0] ?? 'now')}. It waits ${wish.left_s} s more; Stop cancels it.` };
+  }
+  if (wish.name === 'arm') return { step: 3, line: 'The hand lifts it', below: `${reason(against[0] ?? 'now')}.` };
   if (!hello.has_swing_up) {
     return { step: 3, line: 'Ready', act: lift(hello),
       below: hello.is_simulated ? 'The simulated hand lifts it, and lets go when it balances.' : reason(against[0] ?? 'hold it upright, and arm') };
   }
   if (swing.length === 0) return { step: 3, line: 'Ready', below: 'Hands off: the motor swings it up.', act: raise };
-  const isSwinging = begins(swing, 'the links do not hang') || begins(swing, 'something moves');
-  return { step: 3, line: 'Hanging, motor off', below: isSwinging ? 'It still swings.' : `${reason(swing[0])}.`,
+  const hangs = !begins(swing, 'the links do not hang');
+  const isSwinging = !hangs || begins(swing, 'something moves');
+  const line = hangs ? 'Hanging, motor off' : 'Motor off, not hanging yet';
+  if (wish.lapsed === 'up' && isSwinging) {
+    const remedy = hello.is_simulated ? 'Let the hand hold it still, then raise it' : 'Hold it still with your hand, then raise it';
+    return { step: 3, line, below: `Not raised: after ${LAPSES_MS / 1e3} s it still swings. ${remedy}.`, act: still ?? { ...raise, text: 'Raise when still' } };
+  }
+  return { step: 3, line, below: isSwinging ? 'It still swings: links of little friction do so for minutes.' : `${reason(swing[0])}.`,
     act: { ...raise, text: isSwinging ? 'Raise when still' : 'Raise when possible' } };
 }
 
 function balancing({ hello, machine: told }) {
-  if (told?.pull) return { step: 4, line: `You pull ${bodyName(told.pull.body)} with ${newtons(Math.hypot(...told.pull.force_n))}`, below: 'Let go, and watch it come back.' };
+  if (told?.pull) {
+    return { step: 4, line: `You pull ${bodyName(told.pull.body)} with ${newtons(Math.hypot(...told.pull.force_n))}`,
+      below: hello.falls_when_held && told.pull.body > 0 ? 'Let go at once: a pull that is held fells it.' : 'Let go, and watch it come back.' };
+  }
   if (told?.holding === 'upright') return { step: 4, line: 'Balancing, and the hand still holds it', below: '', act: { text: 'Let go', key: 'f', asks: [hand('free')] } };
   return { step: 4, line: 'Balancing', isDone: true,
-    below: hello.is_simulated ? 'Pull it, drag the ◆ on the rail, or break something.' : 'Move the set-point, or push it gently.',
+    below: !hello.is_simulated ? 'Move the set-point, or push it gently.'
+      : hello.falls_when_held ? 'Pull the cart, drag the ◆, or break something. A link stands a short tug only: a pull that is held fells it, however weak.'
+        : 'Pull it, drag the ◆ on the rail, or break something.',
     act: hello.has_swing_up ? { text: 'Lower', key: 's', asks: [say('down')] } : undefined };
 }
 
@@ -126,7 +153,7 @@ const BY_STATE = {
   Jogging: () => ({ step: 2, line: 'The motor pushes the cart', below: 'Hold the button until it has learnt its sense.', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' } }),
   Identifying: () => ({ step: 2, line: 'The motor shakes the links' }),
   Armed: ({ hello, latest, machine: told, wish }) => ({ step: 3, line: 'Armed: waits until all links are upright and still', below: reason(latest.against_arming[0] ?? ''),
-    act: hello.is_simulated && wish !== 'arm' && told?.holding !== 'upright' ? lift(hello) : undefined }),
+    act: hello.is_simulated && wish.name !== 'arm' && told?.holding !== 'upright' ? lift(hello) : undefined }),
   Raising: () => ({ step: 3, line: 'The motor swings it up', below: 'Hands off until it stands.' }),
   Balancing: balancing,
   Holding: () => ({ step: 4, line: 'Holding where some links hang', act: { ...raise, asks: [say('up')], wish: undefined } }),
@@ -134,7 +161,7 @@ const BY_STATE = {
   Fault: fallen,
 };
 
-// `now`: hello, picture, the latest telemetry, the name of the wish, the fall, the step before, and whether this page
+// `now`: hello, picture, the latest telemetry, what the wish tells, the fall, the step before, and whether this page
 // is in command. The answer: `step`, `line`, `below`, and the `act`, if there is one.
 export function guide(now) {
   const { picture, latest } = now;
@@ -146,6 +173,7 @@ export function guide(now) {
   }
   if (latest === null) return { step: 0, line: 'connecting …', below: '' };
   const shown = BY_STATE[latest.state]({ ...now, machine: told });
+  shown.below = plain(shown.below ?? '');
   if (!now.isCommander) {
     return { ...shown, below: picture.commander === null ? 'Nobody is in command.' : 'Another page is in command. Stop works here, too.',
       act: picture.commander === null ? { text: 'Take command', asks: [{ ask: 'command' }] } : undefined };

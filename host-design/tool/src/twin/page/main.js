@@ -46,7 +46,7 @@ const ask = connect({
     }
     controls.picture(picture, latest, isCommander);
     drawers.picture(picture.machine);
-    const now = guide({ hello, picture, latest, wish: wish.name, fall: witness.fall, step: seen.step, isCommander });
+    const now = guide({ hello, picture, latest, wish: wish.told(), fall: witness.fall, step: seen.step, isCommander });
     seen.step = now.step;
     controls.guided(now, latest, picture.fault, witness.fall);
   },

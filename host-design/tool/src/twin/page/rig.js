@@ -2,6 +2,7 @@
 
 import { colour } from './colours.js';
 import { newtons } from './guide.js';
+import { roundValues } from './scale.js';
 
 const NEAR_PX = 28; // how near the pointer has to be to a body
 const BELOW_PX = 64; // of the rail's numbers and the set-point, below the cart
@@ -296,7 +297,7 @@ export class RigView {
     draw.fillStyle = colour('--muted');
     draw.font = '12px system-ui, sans-serif';
     draw.textAlign = 'center';
-    for (let x = Math.ceil(Math.max(low, left) / step) * step; x <= Math.min(high, right); x += step) {
+    for (const x of roundValues(Math.max(low, left), Math.min(high, right), step)) {
       const [px, py] = this.toScreen([x, 0]);
       draw.fillText(`${Number(x.toFixed(2))} m`.replace('-', '−'), px, py + 32);
     }

@@ -4,6 +4,7 @@ import { colour, dash } from './colours.js';
 import { isEstimated, isHomed, isOn } from './guide.js';
 import { CAPACITY, ESTIMATED, History, UNKNOWN } from './history.js';
 import { context } from './rig.js';
+import { niceStep, roundValues, turnsOf, within } from './scale.js';
 
 const LONGEST_S = 60;
 const SHORTEST_S = 0.2;
@@ -20,7 +21,7 @@ function panels(hello) {
   const estimate = (index, factor = 1) => (t) => (isEstimated(t) ? t.estimate[index] * factor : NaN);
   const motor = (name) => (t) => (isOn(t) ? t[name] : NaN);
   return [
-    { title: 'Angle', unit: '°', least: 0.5, without: 'no estimate', limits: [1, -1].map((side) => side * hello.angle_limit_rad * DEGREES),
+    { title: 'Angle', unit: '°', least: 0.5, turn: 360, without: 'no estimate', limits: [1, -1].map((side) => side * hello.angle_limit_rad * DEGREES),
       curves: joints.map(({ name, sensor }) => ({ name, value: estimate(2 * sensor, DEGREES), seen: (state) => state[2 * sensor] * DEGREES, ink: `--c${(sensor - 1) % 6}` })) },
     { title: 'Position', unit: 'm', least: 0.01, without: 'no estimate', limits: hello.soft_m, curves: [
       { name: 'cart', value: estimate(0), seen: (state) => state[0], ink: '--ink' }, { name: 'set-point', value: (t) => t.setpoint_m, ink: '--link' }] },
@@ -180,11 +181,11 @@ export class Scopes {
     return (t) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * (t - begin)) / this.span;
   }
 
-  range({ least }, rows, from, to) {
+  range({ least, turn }, rows, from, to) {
     let [low, high] = [Infinity, -Infinity];
     for (const row of rows) {
       for (let k = from; k < to; k += 1) {
-        const value = row[k % CAPACITY];
+        const value = within(row[k % CAPACITY], turn);
         if (value < low) low = value;
         if (value > high) high = value;
       }
@@ -212,13 +213,14 @@ export class Scopes {
       draw.lineWidth = thickness;
       draw.setLineDash(pattern);
       draw.beginPath();
-      let isDown = false;
+      let before = NaN;
       for (let k = from; k < to; k += 1) {
-        const value = row[k % CAPACITY];
-        if (Number.isNaN(value)) isDown = false;
-        else if (isDown) draw.lineTo(x(history.time(k)), y(value));
-        else draw.moveTo(x(history.time(k)), y(value));
-        isDown = !Number.isNaN(value);
+        const value = within(row[k % CAPACITY], panel.turn);
+        // Where nothing is known, or where a turn is full, the curve begins again.
+        const goesOn = Math.abs(value - before) < (panel.turn ?? Infinity) / 2;
+        if (goesOn) draw.lineTo(x(history.time(k)), y(value));
+        else if (!Number.isNaN(value)) draw.moveTo(x(history.time(k)), y(value));
+        before = value;
       }
       draw.stroke();
     };
@@ -264,7 +266,8 @@ export class Scopes {
     const read = (row) => (row === null || !isThere ? NaN : row[index % CAPACITY]);
     panel.values.forEach((place, i) => {
       const [value, true_] = [read(rows[i]), read(seen[i])];
-      const text = Number.isFinite(value) ? short(value) : Number.isFinite(true_) ? `(${short(true_)})` : '—';
+      const said = (all) => `${short(within(all, panel.turn))}${turnsOf(all, panel.turn)}`;
+      const text = Number.isFinite(value) ? said(value) : Number.isFinite(true_) ? `(${said(true_)})` : '—';
       if (place.textContent !== text) place.textContent = text;
     });
   }
@@ -283,7 +286,7 @@ export class Scopes {
     draw.lineWidth = 1;
     draw.textAlign = 'right';
     const step = niceStep((high - low) / 5);
-    for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
+    for (const value of roundValues(low, high, step)) {
       across(value);
       draw.fillText(short(value), MARGIN.left - 6, y(value) + 4);
     }
@@ -298,7 +301,7 @@ export class Scopes {
     draw.font = '12px system-ui, sans-serif';
     draw.textAlign = 'center';
     const step = niceStep(this.span / 5);
-    for (let t = Math.ceil(Math.max(0, this.end - this.span) / step) * step; t <= this.end; t += step) {
+    for (const t of roundValues(Math.max(0, this.end - this.span), this.end, step)) {
       if (x(t) < this.axis.clientWidth - 16 || NARROW.matches) draw.fillText(`${Number(t.toFixed(2))} s`, x(t), y);
     }
   }
@@ -341,12 +344,6 @@ export class Scopes {
     }
     return sheet.toDataURL('image/png');
   }
-}
-
-// 1, 2 or 5 times a power of ten, at least `size`.
-function niceStep(size) {
-  const power = 10 ** Math.floor(Math.log10(size));
-  return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= size);
 }
 
 const short = (value) => Number(value.toPrecision(3)).toString().replace('-', '−');

@@ -215,6 +215,18 @@ impl Browser {
         self.call("Input.dispatchKeyEvent", json!({ "type": "keyDown", "key": "", "commands": [command] }));
     }
 
+    /// Roles of the controls without a name, which a screen reader cannot tell apart.
+    pub(crate) fn unnamed_controls(&mut self) -> Vec<String> {
+        let tree = self.call("Accessibility.getFullAXTree", json!({}));
+        let roles = ["slider", "button", "textbox", "combobox", "checkbox", "spinbutton", "link"];
+        let is_control = |node: &&Value| roles.iter().any(|role| node["role"]["value"] == *role);
+        let controls: Vec<&Value> = tree["nodes"].as_array().unwrap().iter().filter(is_control).collect();
+        assert!(!controls.is_empty(), "no controls");
+        let has_no_name =
+            |node: &&&Value| node["name"]["value"].as_str().unwrap_or_default().trim().is_empty();
+        controls.iter().filter(has_no_name).map(|node| node["role"]["value"].to_string()).collect()
+    }
+
     /// From now on, what the page saves goes into this folder.
     pub(crate) fn save_into(&mut self, folder: &Path) {
         let behaviour = json!({ "behavior": "allow", "downloadPath": folder });

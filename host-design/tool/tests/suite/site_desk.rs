@@ -1,0 +1,208 @@
+//! The desk of the page does not lose what a person works on, and says what is wrong where they look.
+//!
+//! Runs where `UPRIGHT_REQUIRE_WASM=1` is set, and needs Chromium or Chrome.
+
+use serde_json::json;
+
+use crate::report_devtools::Browser;
+use crate::site_page::{TELEPHONE, opened, opened_in, root, type_in, until};
+use crate::twin_page::{click, comes_within};
+
+const TEXT: &str = "document.getElementById('toml').value";
+const VERDICT: &str = "document.getElementById('verdict')";
+
+fn read(rig: &str) -> String {
+    std::fs::read_to_string(root().join(format!("rigs/{rig}.toml"))).unwrap()
+}
+
+/// A rig that is no example.
+fn own() -> String {
+    read("single-quanser-ip02").replace("mass_kg = 0.230", "mass_kg = 0.231")
+}
+
+fn address(browser: &mut Browser) -> String {
+    browser.value("location.href").as_str().unwrap().to_owned()
+}
+
+fn reload(browser: &mut Browser, address: &str) {
+    // A page that differs in the part behind the mark alone is not loaded again.
+    browser.open_address("about:blank", 1280, "light", "screen");
+    browser.open_address(address, 1280, "light", "screen");
+    until(browser, "upright.desk.design");
+}
+
+/// Waits until what is shown is the design of this text, which is in the editor.
+fn designed(browser: &mut Browser, toml: &str) {
+    until(browser, &format!("{TEXT} === {} && {VERDICT}.textContent.startsWith('It ')", json!(toml)));
+}
+
+#[test]
+fn edited_work_outlives_the_link_it_came_from_and_a_damaged_link_stops_nothing() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    type_in(&mut browser, &own());
+    designed(&mut browser, &own());
+    click(&mut browser, "#link");
+    let link = address(&mut browser);
+    assert!(link.contains("#rig="), "{link}");
+    // Loaded again, unchanged: the rig of the link. Changed and loaded again: the change.
+    reload(&mut browser, &link);
+    assert_eq!(browser.value(TEXT), own());
+    let edited = own().replace("0.231", "0.232");
+    type_in(&mut browser, &edited);
+    designed(&mut browser, &edited);
+    let now = address(&mut browser);
+    assert!(!now.contains('#'), "{now}");
+    reload(&mut browser, &now);
+    assert_eq!(browser.value(TEXT), edited);
+
+    let (plain, code) = link.split_once("#rig=").unwrap();
+    // A link of an older page has no sum; what is in it may be no rig.
+    reload(&mut browser, &format!("{plain}#rig={}", code.split_once('.').unwrap().1));
+    designed(&mut browser, &own());
+    browser.open_address("about:blank", 1280, "light", "screen");
+    browser.open_address(&format!("{plain}#rig=AAAA"), 1280, "light", "screen");
+    until(&mut browser, "!document.getElementById('problem').hidden");
+    click(&mut browser, "#undo");
+    designed(&mut browser, &own());
+    let cut = &link[..link.len() - 40];
+    for damaged in [cut.to_owned(), format!("{plain}#rig=%%%"), link.replace("#rig=", "#rig=x")] {
+        reload(&mut browser, &damaged);
+        let said = browser.value("document.getElementById('notice').textContent");
+        assert!(said.as_str().unwrap().contains("link is damaged"), "{damaged}: {said}");
+        type_in(&mut browser, &own());
+        designed(&mut browser, &own());
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn a_rig_that_an_example_an_exercise_or_a_field_replaces_comes_back_with_undo() {
+    let Some((mut browser, folder)) = opened() else { return };
+    type_in(&mut browser, &own());
+    designed(&mut browser, &own());
+    let begin = "{ const example = document.getElementById('example'); example.value = 'double-quanser-dbpen'; \
+                 example.dispatchEvent(new Event('change')); }";
+    browser.value(begin);
+    designed(&mut browser, &read("double-quanser-dbpen"));
+    click(&mut browser, "#notice button");
+    designed(&mut browser, &own());
+    click(&mut browser, "#redo");
+    designed(&mut browser, &read("double-quanser-dbpen"));
+    click(&mut browser, "#undo");
+    designed(&mut browser, &own());
+    // An exercise, and the keys; also after the page is loaded again.
+    click(&mut browser, "#lesson-list button");
+    designed(&mut browser, &read("single-quanser-ip02"));
+    let page = address(&mut browser);
+    reload(&mut browser, &page);
+    let undo = "document.getElementById('toml').dispatchEvent(new KeyboardEvent('keydown', \
+                { key: 'z', ctrlKey: true, cancelable: true }))";
+    assert_eq!(browser.value(undo), false, "the browser's own undo is in the way");
+    designed(&mut browser, &own());
+    // A field.
+    field(&mut browser, "link[1].mass_kg", "0.3");
+    designed(&mut browser, &own().replace("0.231", "0.3"));
+    click(&mut browser, "#undo");
+    designed(&mut browser, &own());
+    // A file that is dropped.
+    let dropped = read("double-quanser-dbpen");
+    browser.value(&format!(
+        "{{ const data = new DataTransfer(); data.items.add(new File([{}], 'mine.toml')); \
+         document.body.dispatchEvent(new DragEvent('drop', {{ dataTransfer: data, bubbles: true, cancelable: true }})); }}",
+        json!(dropped)
+    ));
+    designed(&mut browser, &dropped);
+    click(&mut browser, "#notice button");
+    designed(&mut browser, &own());
+    // Negative control: an untouched example needs no word.
+    browser.value(begin);
+    designed(&mut browser, &read("double-quanser-dbpen"));
+    browser.value(&begin.replace("double-quanser-dbpen", "single-stepper"));
+    designed(&mut browser, &read("single-stepper"));
+    assert_eq!(browser.value("document.getElementById('notice').hidden"), true);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+    drop(folder);
+}
+
+/// Writes a value into a field, as a person does.
+fn field(browser: &mut Browser, key: &str, value: &str) {
+    browser.value(&format!(
+        "{{ const input = document.getElementById('field-{key}'); input.value = '{value}'; \
+         input.dispatchEvent(new Event('change')); }}"
+    ));
+}
+
+#[test]
+fn after_a_wrong_input_nothing_is_called_good_and_the_reason_is_in_sight() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    let good = format!("{VERDICT}.className === 'good'");
+    until(&mut browser, &good);
+    let in_sight =
+        format!("(({{ top, bottom }}) => top >= 0 && bottom <= 800)({VERDICT}.getBoundingClientRect())");
+    for (value, reason) in [
+        ("-1", "mass"),
+        ("", "give a number"),
+        ("abc", "is no number"),
+        ("1e400", "larger than"),
+        ("1e9", ""),
+    ] {
+        field(&mut browser, "link[1].mass_kg", value);
+        let is_told = format!(
+            "{VERDICT}.className !== 'good' && !{VERDICT}.textContent.startsWith('It stays upright.')"
+        );
+        until(&mut browser, &is_told);
+        if !reason.is_empty() {
+            let told = browser.value(&format!(
+                "[{VERDICT}, document.getElementById('field-link[1].mass_kg').nextElementSibling].map((e) => e.textContent)"
+            ));
+            for told in [&told[0], &told[1]] {
+                let told = told.as_str().unwrap();
+                assert!(
+                    told.contains(reason) && !told.contains("quoted") && !told.contains('`'),
+                    "{value}: {told}"
+                );
+            }
+            assert_eq!(browser.value("document.getElementById('save-table').disabled"), true);
+        }
+        assert_eq!(browser.value(&in_sight), true, "{value}");
+        field(&mut browser, "link[1].mass_kg", "0.23");
+        until(&mut browser, &good);
+    }
+    // An error in the text.
+    type_in(&mut browser, &own().replace("mass_kg", "mas_kg"));
+    until(
+        &mut browser,
+        &format!("{VERDICT}.className === 'bad' && {VERDICT}.textContent.startsWith('line ')"),
+    );
+    assert_eq!(browser.value(&in_sight), true);
+    // What no bench has is said beside the verdict, which is then not green.
+    let heavy = own().replace("mass_kg = 0.231", "mass_kg = 3000.0");
+    type_in(&mut browser, &heavy);
+    until(&mut browser, "document.getElementById('unusual').textContent.includes('link[1].mass_kg')");
+    until(&mut browser, &format!("{VERDICT}.textContent !== '' && {VERDICT}.className !== 'good'"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn the_drawing_the_verdict_and_balance_it_are_in_the_first_screen_before_any_figure() {
+    for (width, height) in [(TELEPHONE, 844), (1280, 800)] {
+        let Some((mut browser, _folder)) = opened_in(width) else { return };
+        until(&mut browser, &format!("{VERDICT}.textContent === 'It stays upright.'"));
+        for part in ["drawing", "verdict", "balance"] {
+            let bottom =
+                browser.value(&format!("document.getElementById('{part}').getBoundingClientRect().bottom"));
+            assert!(bottom.as_f64().unwrap() <= f64::from(height), "{width}: {part} ends at {bottom}");
+        }
+        let before = browser.value(
+            "[...document.querySelectorAll('main input, main button, main select, main textarea')].every((control) => \
+             document.getElementById('drawing').compareDocumentPosition(control) & Node.DOCUMENT_POSITION_FOLLOWING)",
+        );
+        assert_eq!(before, true, "a form comes before the drawing");
+        assert_eq!(browser.value("document.getElementById('example').value"), "single-quanser-ip02");
+        assert_eq!(browser.unnamed_controls(), Vec::<String>::new());
+        // Negative control.
+        browser.value("document.querySelector('label[for=lean]').remove()");
+        assert!(comes_within(&mut browser, 1.0, "!document.querySelector('label[for=lean]')"));
+        assert_eq!(browser.unnamed_controls(), ["\"slider\""]);
+    }
+}
