@@ -15,6 +15,7 @@ mod governor;
 mod in_the_loop;
 mod integral;
 mod lost_loops;
+mod mountings;
 mod own_board;
 mod pico;
 mod plain_equations;

@@ -14,6 +14,8 @@ const RATE: [f64; 2] = [2.0, 0.5];
 pub struct HeldRig {
     hanging: Vec<f64>,
     held: Vec<f64>,
+    /// Where each joint's potentiometer reads nothing (rad).
+    dead_rad: Vec<Option<f64>>,
     /// Largest movement per tick of a joint (rad) and of the cart (m).
     step: [f64; 2],
 }
@@ -25,7 +27,11 @@ impl HeldRig {
             PlantDescription::Chain(_) => hanging_by_hand(rig),
             PlantDescription::Model(_) => vec![0.0; rig.states()],
         };
-        Self { held: hanging.clone(), hanging, step: RATE.map(|rate| rate * rig.tick.period_s) }
+        let mut dead_rad = vec![None; rig.states() / 2];
+        for sensor in rig.sensors().iter().filter(|_| rig.chain().is_some()) {
+            dead_rad[sensor.state / 2] = sensor.dead_rad();
+        }
+        Self { held: hanging.clone(), hanging, dead_rad, step: RATE.map(|rate| rate * rig.tick.period_s) }
     }
 
     /// The state in which the rig is held (m, m/s, rad, rad/s …).
@@ -75,7 +81,30 @@ impl HeldRig {
         for (to, held) in to.iter_mut().zip(&self.held).skip(2).step_by(2) {
             *to += whole_turns(held - *to);
         }
+        self.go_around_dead_bands(&mut to);
         self.move_to(&to)
+    }
+
+    /// Moves the links by one tick's step towards the state `to`, with links whose potentiometers have a dead band on
+    /// the way around it; returns whether they are there, and then is in that state: whole turns do not show in the
+    /// reading of a potentiometer.
+    pub(super) fn put(&mut self, to: &[f64]) -> bool {
+        let mut around = to.to_vec();
+        self.go_around_dead_bands(&mut around);
+        let there = self.move_to(&around);
+        if there {
+            self.take(to);
+        }
+        there
+    }
+
+    /// Adds whole turns to joints with potentiometers, so that there is no dead band between `to` and where they are.
+    fn go_around_dead_bands(&self, to: &mut [f64]) {
+        for (index, dead_rad) in self.dead_rad.iter().enumerate() {
+            let Some(dead_rad) = dead_rad else { continue };
+            let turns = |angle: f64| ((angle - dead_rad) / TAU).floor();
+            to[2 * index] += TAU * (turns(self.held[2 * index]) - turns(to[2 * index]));
+        }
     }
 
     /// Moves the hanging position of the link of this sensor by one turn counter-clockwise; the next link hangs as

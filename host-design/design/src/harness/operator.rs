@@ -144,7 +144,7 @@ impl Operator {
             }
             Doing::Push => self.push(tick, status, output),
             Doing::Raise => {
-                if self.rig.move_to(&self.start) {
+                if self.rig.put(&self.start) {
                     self.doing = Doing::TurnOn;
                 }
                 None

@@ -5,6 +5,7 @@ use core::f64::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::shaking::SPEED_SHARE;
 use upright::supervision::slow_drive::SlowDrive;
 use upright::table::{Equilibrium, Law, StepMap};
@@ -33,8 +34,10 @@ const BAND: [f64; 2] = [0.25, 1.6];
 const LOWEST_MOVED: f64 = 0.7;
 /// Intended motion: largest angle of a link from hanging (rad), and share of the rail.
 pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
-/// A run is abandoned when the cart goes beyond this share of the rail.
+/// A run is abandoned when the cart goes beyond this share of the rail, or a potentiometer does not read.
 const STOP: f64 = 0.85;
+/// Largest intended share of the angle that a potentiometer reads, to the nearer side of hanging.
+const READ_SHARE: f64 = 0.8;
 /// Integration substeps per tick with a motor. Its force is held over a substep, so the back-EMF lags by half of one.
 /// With the usual 4 substeps, the identified masses are 0.15 to 0.4 % too small.
 const SUBSTEPS: usize = 32;
@@ -131,7 +134,7 @@ impl Excitation {
     fn stays(&self, model: &Model, p: &[f64], chain: &Chain, rig: &Rig, limit_n: f64) -> bool {
         let m = model.coordinates();
         let dt_s = rig.tick.period_s * Record::usual_stride(rig.tick.period_s) as f64;
-        let farthest = AIM.1 * half_rail(chain);
+        let (widest, farthest) = (aim_rad(rig), AIM.1 * half_rail(chain));
         let fastest = INPUT_SHARE * speed_limit(rig).unwrap_or(f64::INFINITY);
         let mut state = vec![0.0; model.states()];
         state[1..m].fill(PI);
@@ -142,7 +145,7 @@ impl Excitation {
             state.copy_from_slice(&step.end);
             let turned = state[1..m].iter().map(|phi| (phi - PI).abs()).fold(0.0, f64::max);
             // Written so that NaN counts as leaving the limits.
-            let stays = turned <= AIM.0
+            let stays = turned <= widest
                 && state[0].abs() <= farthest
                 && state[m].abs() <= fastest
                 && force.abs() <= INPUT_SHARE * limit_n;
@@ -152,6 +155,12 @@ impl Excitation {
         }
         true
     }
+}
+
+/// Largest intended angle of a link from hanging (rad): that of [`AIM`], or what the links' potentiometers read.
+pub(super) fn aim_rad(rig: &Rig) -> f64 {
+    let rooms = rig.sensors().into_iter().filter_map(|sensor| sensor.room_rad());
+    rooms.fold(AIM.0, |aim, room| aim.min(READ_SHARE * room))
 }
 
 /// Distance from the middle (x = 0) to the nearer end of the rail (m).
@@ -227,7 +236,8 @@ pub(super) fn shake_machine(
         }
     }
     Err(IdentifyError::Excitation(format!(
-        "{}: the cart leaves {:.0} % of the rail even at {:.0} % of the force; is the rail level?",
+        "{}: the cart leaves {:.0} % of the rail, or a link what its potentiometer reads, even at {:.0} % of the force; is \
+         the rail level?",
         file.name,
         100.0 * STOP,
         100.0 * RETRIES[3]
@@ -238,7 +248,7 @@ pub(super) fn shake_machine(
 fn motion(rig: &Rig, log: &Log) -> Result<f64, IdentifyError> {
     let record = Record::of(rig, core::slice::from_ref(log), Record::usual_stride(rig.tick.period_s));
     let cart = record.extent(0)[0] / (AIM.1 * half_rail(chain_of(rig)?));
-    Ok(cart.max(record.largest_angle() / AIM.0))
+    Ok(cart.max(record.largest_angle() / aim_rad(rig)))
 }
 
 /// One run of `machine`, whose file is `rig`; none if the cart goes too far.
@@ -279,7 +289,7 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
         let counts: Vec<u16> =
             counters.iter().zip(&at_zero).map(|(count, zero)| count.wrapping_sub(*zero) as u16).collect();
         let x = f64::from(Bench::signed(0, counters[0]) as i32) * steps[0];
-        if x.abs() > farthest {
+        if x.abs() > farthest || counters.iter().skip(1).any(|counter| counter & BAD_SAMPLE != 0) {
             return Ok(None);
         }
         let speed = speed.after(x);

@@ -5,7 +5,7 @@ use upright::supervision::shaking::{AHEAD, FORCES, FULL, Shaking};
 
 use super::channel::chain_of;
 use super::error::IdentifyError;
-use super::excite::{AIM, Excitation, half_rail};
+use super::excite::{AIM, Excitation, aim_rad, half_rail};
 use super::log::Log;
 use crate::rig::Rig;
 use crate::table::TableValues;
@@ -37,6 +37,8 @@ pub struct Feed {
     excitation: Excitation,
     period_s: f64,
     steps: Vec<f64>,
+    /// Largest intended angle of a link from hanging (rad).
+    aim_rad: f64,
     half_rail_m: f64,
     pulse_n: f64,
     most_n: f64,
@@ -76,6 +78,7 @@ impl Feed {
             excitation,
             period_s,
             steps: rig.sensors().iter().map(|sensor| sensor.step()).collect(),
+            aim_rad: aim_rad(rig),
             half_rail_m: half_rail(chain),
             pulse_n,
             most_n: (ROOM * RAISE.2 * peak_n).max(pulse_n).min(limit_n),
@@ -212,7 +215,7 @@ impl Feed {
             let mut angle = 0.0;
             for joint in 1..log.channels() {
                 angle += deviation(joint);
-                most = most.max(angle.abs() / AIM.0);
+                most = most.max(angle.abs() / self.aim_rad);
             }
             most = most.max(deviation(0).abs() / (AIM.1 * self.half_rail_m));
         }

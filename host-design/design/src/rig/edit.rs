@@ -116,6 +116,17 @@ fn place<'a>(document: &'a mut Item, key: &str) -> Option<&'a mut Item> {
     })
 }
 
+/// The offset at which `text` gives `key`; none if it does not, or is not TOML.
+pub(super) fn place_in(text: &str, key: &str) -> Option<usize> {
+    let document = RigSource { file: Path::new(""), text }.document().ok()?;
+    let found = key.split('.').try_fold(document.as_item(), |item, step| {
+        let (name, index) = indexed(step);
+        let item = item.get(name)?;
+        index.map_or(Some(item), |index| item.get(index))
+    });
+    found?.span().map(|span| span.start)
+}
+
 /// Splits `name[2]` into the name and the index 1.
 fn indexed(step: &str) -> (&str, Option<usize>) {
     let index = step.strip_suffix(']').and_then(|rest| rest.split_once('['));

@@ -61,4 +61,5 @@ pub use sections::tick::Tick;
 pub use sections::verify::Requirements;
 pub use sections::{SECTIONS, TOP};
 pub use sensors::{AbsoluteRange, Sensor};
+pub use unusual::UnusualValue;
 pub use value::PerJoint;

@@ -39,8 +39,13 @@ pub struct AbsoluteRange {
 impl AbsoluteRange {
     /// The reading at this position (counts); that of an open wire in the dead band of a potentiometer.
     pub fn reading(&self, position: i64) -> u32 {
-        let reading = (i64::from(self.zero) + position - self.rest).rem_euclid(self.turn.into()) as u32;
+        let reading = self.turned(position);
         if reading < 1 << self.bits { reading } else { 0 }
+    }
+
+    /// How far it is turned at this position, from where it would read 0 (counts, within a turn).
+    pub fn turned(&self, position: i64) -> u32 {
+        (i64::from(self.zero) + position - self.rest).rem_euclid(self.turn.into()) as u32
     }
 
     /// Whether it does not read a whole turn.
@@ -107,6 +112,23 @@ impl Sensor {
                 sensor
             }
         }
+    }
+
+    /// The middle of a potentiometer's dead band (rad, up to whole turns).
+    pub fn dead_rad(&self) -> Option<f64> {
+        let range = self.absolute.filter(AbsoluteRange::has_dead_band)?;
+        let middle = 0.5 * (f64::from(1u32 << range.bits) + f64::from(range.turn));
+        Some(self.step::<f64>() * (middle - f64::from(range.zero) + range.rest as f64))
+    }
+
+    /// How far its joint may turn from where it hangs until a potentiometer stops reading (rad).
+    pub fn room_rad(&self) -> Option<f64> {
+        let range = self.absolute.filter(AbsoluteRange::has_dead_band)?;
+        let hangs = range.rest;
+        let reads =
+            |away: &i64| ![hangs - away, hangs + away].iter().any(|&at| range.is_dead(range.reading(at)));
+        let counts = (0..i64::from(range.turn)).take_while(reads).last().unwrap_or_default();
+        Some(self.step::<f64>() * counts as f64)
     }
 
     /// Variance of its error: that of rounding, `step²/12`, and that of its noise.

@@ -99,7 +99,7 @@ impl Bench {
             driver: Driver::of(rig),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
-            sensors: SimulatedSensor::all(rig, scenario.counter_start),
+            sensors: SimulatedSensor::all(rig, scenario.counter_start, &scenario.start),
             counter_start: scenario.counter_start,
             random: Pcg64::seed_from_u64(scenario.seed),
             force_noise_n: noise(scenario.force_noise_n)?,
@@ -129,6 +129,7 @@ impl Bench {
     pub fn hold(&mut self, state: &[f64]) {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
+        self.sensors.iter_mut().for_each(|sensor| sensor.carry(state[sensor.state]));
         self.servo.iter_mut().for_each(Servo::rest);
         self.pulses = pulses_at(state, self.step_m, self.servo.as_ref());
         self.missed = 0;
@@ -137,6 +138,7 @@ impl Bench {
     /// Continues where `before` is, which simulates the same rig with other properties.
     pub fn take_over(&mut self, before: &Self) {
         self.hold(&before.state);
+        self.sensors.iter_mut().zip(&before.sensors).for_each(|(sensor, before)| sensor.take_over(before));
         (self.pulses, self.missed) = (before.pulses, before.missed);
     }
 
@@ -188,7 +190,8 @@ impl Bench {
         counters
     }
 
-    /// Writes the readings of the counters at position 0 into `counters`.
+    /// Writes the readings of the counters at position 0 into `counters`: on the turn of the state in which the rig was
+    /// switched on.
     pub fn read_counters_at_zero(&self, counters: &mut [u32]) {
         for (index, counter) in counters.iter_mut().enumerate() {
             let at_zero = self.sensors.get(index).map(|sensor| sensor.at_zero(self.counter_start));

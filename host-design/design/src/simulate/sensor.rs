@@ -17,25 +17,28 @@ pub(super) struct SimulatedSensor {
 /// An absolute sensor, and what the board makes of its readings.
 struct Absolute {
     range: AbsoluteRange,
-    /// The count that the board has made of the reading at position 0, at power-up.
+    /// The last position (counts).
+    counts: i64,
+    /// The count at position 0 on the turn on which the sensor was switched on.
     at_zero: u32,
     board: AbsoluteSensor,
 }
 
 impl SimulatedSensor {
-    /// The sensors of a rig. An absolute sensor of the cart reads `counter_start` at position 0.
-    pub(super) fn all(rig: &Rig, counter_start: u32) -> Vec<Self> {
-        rig.sensors().iter().map(|sensor| Self::of(sensor, counter_start)).collect()
+    /// The sensors of a rig that is switched on in this state. An absolute sensor of the cart reads `counter_start` at
+    /// position 0.
+    pub(super) fn all(rig: &Rig, counter_start: u32, state: &[f64]) -> Vec<Self> {
+        rig.sensors().iter().map(|sensor| Self::of(sensor, counter_start, state[sensor.state])).collect()
     }
 
-    fn of(sensor: &Sensor, counter_start: u32) -> Self {
+    fn of(sensor: &Sensor, counter_start: u32, position: f64) -> Self {
         let step: f64 = sensor.step();
+        let counts = nearest(position / step);
         let absolute = sensor.absolute.map(|mut range| {
             if sensor.state == 0 {
                 range.zero = counter_start % range.turn;
             }
-            let mut board = AbsoluteSensor::new(range.bits);
-            Absolute { range, at_zero: board.count(range.reading(0)), board }
+            Absolute::switched_on(range, counts)
         });
         Self { state: sensor.state, noise: sensor.noise, step, absolute }
     }
@@ -45,10 +48,23 @@ impl SimulatedSensor {
         let counts = nearest(position / self.step);
         match &mut self.absolute {
             None => counter_start.wrapping_add(counts as u32),
-            Some(Absolute { range, board, .. }) => {
-                let reading = range.reading(counts);
-                if range.has_dead_band() { reading } else { board.count(reading) }
-            }
+            Some(absolute) => absolute.count(counts),
+        }
+    }
+
+    /// A hand has moved the rig to this position (unit of the state). It is slower than the board.
+    pub(super) fn carry(&mut self, position: f64) {
+        let counts = nearest(position / self.step);
+        if let Some(absolute) = &mut self.absolute {
+            absolute.carry(counts);
+        }
+    }
+
+    /// Counts on from where `before` is, which is the same sensor.
+    pub(super) fn take_over(&mut self, before: &Self) {
+        if let (Some(absolute), Some(before)) = (&mut self.absolute, &before.absolute) {
+            (absolute.counts, absolute.at_zero) = (before.counts, before.at_zero);
+            absolute.board.clone_from(&before.board);
         }
     }
 
@@ -60,6 +76,32 @@ impl SimulatedSensor {
     /// The count at position 0.
     pub(super) fn at_zero(&self, counter_start: u32) -> u32 {
         self.absolute.as_ref().map_or(counter_start, |absolute| absolute.at_zero)
+    }
+}
+
+impl Absolute {
+    /// A sensor whose first reading is that at `counts`.
+    fn switched_on(range: AbsoluteRange, counts: i64) -> Self {
+        let mut sensor = Self { range, counts, at_zero: 0, board: AbsoluteSensor::new(range.bits) };
+        // A potentiometer has no count in its dead band, but a position.
+        let first = if range.has_dead_band() { range.turned(counts) } else { sensor.count(counts) };
+        sensor.at_zero = first.wrapping_sub(counts as u32);
+        sensor
+    }
+
+    /// What the board makes of the reading at this position (counts): a potentiometer's counter is its reading.
+    fn count(&mut self, counts: i64) -> u32 {
+        self.counts = counts;
+        let reading = self.range.reading(counts);
+        if self.range.has_dead_band() { reading } else { self.board.count(reading) }
+    }
+
+    /// Goes to this position (counts) in steps of less than half a turn.
+    fn carry(&mut self, counts: i64) {
+        let (from, steps) = (self.counts, 4 * (counts - self.counts).abs() / i64::from(self.range.turn) + 1);
+        for step in 1..=steps {
+            self.count(from + (counts - from) * step / steps);
+        }
     }
 }
 

@@ -137,16 +137,19 @@ fn torque_and_back_emf_constants_may_differ() {
 
 /// v' = -a v - c sign(v) + b V with the a, b and c that github.com/zjor/inverted-pendulum found, and 0.5 kg in motion.
 #[test]
-fn a_motor_that_is_known_by_its_motion_is_described_by_one_ohm_and_one_metre() {
+fn a_motor_that_is_known_by_its_motion_is_described_by_one_newton_per_ampere() {
     let (a, b, c, mass) = (35.98, 2.22, 2.79, 0.5);
     let text = format!(
-        "{MINIMAL}[actuator]\nresistance_ohm = 1\npulley_radius_m = 1\ntorque_constant_n_m_per_a = {}\n\
+        "{MINIMAL}[actuator]\nresistance_ohm = {}\npulley_radius_m = 0.01\ntorque_constant_n_m_per_a = 0.01\n\
          back_emf_constant_v_s_per_rad = {}\ndead_zone_v = {}\nsupply_v = 12\n",
-        mass * b,
-        a / b,
+        1.0 / (mass * b),
+        0.01 * a / b,
         c / b
     );
-    let motor = parse(&text).actuator.motor.unwrap();
+    let rig = parse(&text);
+    assert_eq!(rig.unusual_values(), []);
+    let motor = rig.actuator.motor.unwrap();
+    assert!((motor.newtons_per_amp() - 1.0).abs() < 1e-12);
     let plant = MotorPlant::of(&motor);
     for (duty, speed) in [(1.0, 0.0), (0.5, 0.3), (-0.75, -0.2)] {
         let wanted = mass * (b * duty * 12.0 - a * speed - c * f64::signum(duty));
@@ -160,24 +163,80 @@ fn a_motor_that_is_known_by_its_motion_is_described_by_one_ohm_and_one_metre() {
 
 #[test]
 fn values_of_another_unit_are_doubted_and_those_of_the_benches_are_not() {
-    let unusual = |from: &str, to: &str| parse(&MINIMAL.replace(from, to)).unusual_values();
-    assert_eq!(parse(MINIMAL).unusual_values(), Vec::<String>::new());
+    let sentences = |rig: &Rig| rig.unusual_values().iter().map(ToString::to_string).collect::<Vec<_>>();
+    let unusual = |from: &str, to: &str| sentences(&parse(&MINIMAL.replace(from, to)));
+    assert_eq!(parse(MINIMAL).unusual_values(), []);
     let length = unusual("length_m = ", "length_m = 100");
     assert!(matches!(&length[..], [doubt] if doubt.starts_with("link[1].length_m = 100")), "{length:?}");
     for rig in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs")).unwrap() {
         let path = rig.unwrap().path();
         if path.extension().is_some_and(|ending| ending == "toml") {
-            assert_eq!(
-                Rig::from_path(&path).unwrap().unusual_values(),
-                Vec::<String>::new(),
-                "{}",
-                path.display()
-            );
+            assert_eq!(Rig::from_path(&path).unwrap().unusual_values(), [], "{}", path.display());
         }
     }
     let pulley = "[actuator]\ntorque_constant_n_m_per_a = 0.01\nresistance_ohm = 1\npulley_radius_m = 6.35\nsupply_v = 12\n";
-    let doubts = parse(&format!("{MINIMAL}{pulley}")).unusual_values();
+    let doubts = sentences(&parse(&format!("{MINIMAL}{pulley}")));
     assert!(doubts[0].contains("pulley_radius_m = 6.35 m") && doubts[1].contains("m/s"), "{doubts:?}");
+}
+
+/// A motor rig and a stepper's, whose every number has the usual size.
+const MOTOR_RIG: &str = "name = \"m\"\n[cart]\nmass_kg = 0.8\nencoder_step_m = 2e-5\ntravel_m = [-0.4, 0.4]\n\
+    [[link]]\nmass_kg = 0.15\nlength_m = 0.45\nencoder_step_rad = 0.0015\n[actuator]\nforce_limit_n = 15\n\
+    torque_constant_n_m_per_a = 0.01\nresistance_ohm = 2\npulley_radius_m = 0.01\nsupply_v = 12\n\
+    [tick]\nperiod_s = 0.001\n[limits]\nspeed_m_per_s = 1.2\n";
+const STEPPER_RIG: &str = "name = \"s\"\n[cart]\n[[link]]\nmass_kg = 0.15\nlength_m = 0.45\n[actuator]\n\
+    kind = \"acceleration\"\nacceleration_limit_m_per_s2 = 10\nstep_m = 2e-5\nspeed_limit_m_per_s = 1\n";
+
+#[test]
+fn a_number_in_a_unit_that_is_wrong_by_a_thousand_is_doubted_with_its_key_and_line() {
+    for (text, line, key) in [
+        (MOTOR_RIG, "mass_kg = 0.8", "cart.mass_kg"),
+        (MOTOR_RIG, "encoder_step_m = 2e-5", "cart.encoder_step_m"),
+        (MOTOR_RIG, "mass_kg = 0.15", "link[1].mass_kg"),
+        (MOTOR_RIG, "length_m = 0.45", "link[1].length_m"),
+        (MOTOR_RIG, "encoder_step_rad = 0.0015", "link[1].encoder_step_rad"),
+        (MOTOR_RIG, "force_limit_n = 15", "actuator.force_limit_n"),
+        (MOTOR_RIG, "torque_constant_n_m_per_a = 0.01", "actuator.torque_constant_n_m_per_a"),
+        (MOTOR_RIG, "resistance_ohm = 2", "actuator.resistance_ohm"),
+        (MOTOR_RIG, "pulley_radius_m = 0.01", "actuator.pulley_radius_m"),
+        (MOTOR_RIG, "supply_v = 12", "actuator.supply_v"),
+        (MOTOR_RIG, "period_s = 0.001", "tick.period_s"),
+        (MOTOR_RIG, "speed_m_per_s = 1.2", "limits.speed_m_per_s"),
+        (STEPPER_RIG, "acceleration_limit_m_per_s2 = 10", "actuator.acceleration_limit_m_per_s2"),
+        (STEPPER_RIG, "step_m = 2e-5", "actuator.step_m"),
+        (STEPPER_RIG, "speed_limit_m_per_s = 1", "actuator.speed_limit_m_per_s"),
+    ] {
+        assert_eq!(parse(text).unusual_values(), []);
+        let (name, value) = line.split_once(" = ").unwrap();
+        let value: f64 = value.parse().unwrap();
+        let doubted = [1e3, 1e-3].map(|factor| {
+            let changed = text.replacen(line, &format!("{name} = {:e}", factor * value), 1);
+            let found = parse(&changed).unusual_values();
+            let found = found.iter().find(|found| found.key == key);
+            let wanted = changed
+                .lines()
+                .position(|found| found.starts_with(&format!("{name} = {:e}", factor * value)));
+            found
+                .map(|found| assert_eq!(found.line(&changed), wanted.map(|line| line + 1), "{key}"))
+                .is_some()
+        });
+        // A tick of 1 µs is refused, and some are usual in one direction.
+        assert!(doubted.contains(&true), "{key}");
+    }
+    // As given by those who found that nothing was said.
+    for (line, wrong) in [
+        ("period_s = 0.001", "period_s = 2"),
+        ("resistance_ohm = 2", "resistance_ohm = 2200"),
+        ("resistance_ohm = 2", "resistance_ohm = 0.0022"),
+        ("force_limit_n = 15", "force_limit_n = 10000"),
+        ("encoder_step_m = 2e-5", "encoder_step_m = 0.0167"),
+        ("speed_m_per_s = 1.2", "speed_m_per_s = 1200"),
+        ("mass_kg = 0.15", "mass_kg = 100"),
+        ("encoder_step_rad = 0.0015", "encoder_step_rad = 0.15"),
+    ] {
+        let doubts = parse(&MOTOR_RIG.replacen(line, wrong, 1)).unusual_values();
+        assert!(doubts.iter().any(|doubt| doubt.to_string().contains("usual")), "{wrong}");
+    }
 }
 
 #[test]
