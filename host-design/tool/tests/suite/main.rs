@@ -44,6 +44,7 @@ mod site_desk;
 mod site_exercises;
 mod site_pace;
 mod site_page;
+mod site_picture;
 mod site_serial;
 mod site_shown;
 mod site_twin;

@@ -136,7 +136,7 @@ fn without_policy(html: &str) -> String {
     [&html[..begin], &html[end..]].concat()
 }
 
-/// The verdict and every requirement come first, the rest is folded, and what stays in sight while one scrolls is small.
+/// The verdict and every requirement come first, the rest is folded, and little stays in sight while one scrolls.
 fn a_person_sees_the_verdict_first(browser: &mut Browser, page: &Path) {
     for width in [TELEPHONE, 1200] {
         browser.open(page, width, "light", "screen");
@@ -153,6 +153,10 @@ fn a_person_sees_the_verdict_first(browser: &mut Browser, page: &Path) {
              .reduce((sum, part) => sum + part.getBoundingClientRect().height, 0)",
         );
         assert!(stays.as_f64().is_some_and(|height| height < 0.15 * 844.0), "{width}: {stays} px");
+        let read = "[...document.querySelectorAll('.controls select')].every((choice) => parseFloat(getComputedStyle(choice).fontSize) > 10)";
+        assert_eq!(browser.value(read), true, "{width}: a choice cannot be read");
+        let doubled = "[...document.querySelectorAll('nav a')].length - new Set([...document.querySelectorAll('nav a')].map(String)).size";
+        assert_eq!(browser.value(doubled), 0);
         // A link leads into what is folded.
         browser.value("document.querySelectorAll('details').forEach((folded) => { folded.open = false; })");
         browser.value("document.querySelector('nav a[href=\"#gains\"]').click()");
@@ -211,22 +215,8 @@ fn a_test_without_its_browser_passes_says_so_and_fails_where_one_is_required() {
     assert!(!tested(true).status.success());
 }
 
-#[test]
-fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
-    let Some(mut browser) = Browser::for_test_of("the report") else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let page = folder.path().join("report.html");
-    let html = &SINGLE.html;
-    std::fs::write(&page, html).unwrap();
-    assert_eq!(faults(&mut browser, &page, true), Vec::<String>::new());
-    a_person_sees_the_verdict_first(&mut browser, &page);
-    nothing_else_is_let_in(&mut browser, &page, html);
-    // The negative controls put scripts and styles into the page.
-    let html = &without_policy(html);
-    std::fs::write(&page, html).unwrap();
-    browser.open(&page, 1200, "light", "screen");
-    let light = browser.value("getComputedStyle(document.body).backgroundColor");
-
+/// Negative controls of [`faults`] on a page without a policy that has the colour `light`.
+fn each_fault_is_found(browser: &mut Browser, page: &Path, html: &str, light: &Value) {
     use Medium::{Paper, Screen, Telephone};
     let broken = [
         (Screen, "</body>", "<script>throw new Error('on purpose')</script></body>", "on purpose"),
@@ -262,15 +252,33 @@ fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
     ];
     for (medium, part, instead, fault) in broken {
         assert!(html.contains(part), "{part}");
-        std::fs::write(&page, html.replace(part, instead)).unwrap();
+        std::fs::write(page, html.replace(part, instead)).unwrap();
         let found = match medium {
-            Screen => on_a_screen(&mut browser, &page, true).0,
-            Telephone => on_a_telephone(&mut browser, &page, &light),
-            Paper => on_paper(&mut browser, &page, &light),
+            Screen => on_a_screen(browser, page, true).0,
+            Telephone => on_a_telephone(browser, page, light),
+            Paper => on_paper(browser, page, light),
         };
         assert!(found.iter().any(|found| found.contains(fault)), "{fault}: {found:?}");
     }
+}
 
+#[test]
+fn the_page_works_in_a_browser_and_each_of_its_faults_is_found() {
+    let Some(mut browser) = Browser::for_test_of("the report") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("report.html");
+    let html = &SINGLE.html;
+    std::fs::write(&page, html).unwrap();
+    assert_eq!(faults(&mut browser, &page, true), Vec::<String>::new());
+    a_person_sees_the_verdict_first(&mut browser, &page);
+    nothing_else_is_let_in(&mut browser, &page, html);
+    // The negative controls put scripts and styles into the page.
+    let html = &without_policy(html);
+    std::fs::write(&page, html).unwrap();
+    browser.open(&page, 1200, "light", "screen");
+    let light = browser.value("getComputedStyle(document.body).backgroundColor");
+
+    each_fault_is_found(&mut browser, &page, html, &light);
     std::fs::write(&page, &LINEAR.html).unwrap();
     assert_eq!(faults(&mut browser, &page, false), Vec::<String>::new());
 }

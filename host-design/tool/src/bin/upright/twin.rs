@@ -26,7 +26,8 @@ use crate::variation::{Variation, Wanted, law_option, positive, with_stored_moti
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
-  upright twin rigs/quadruple-paper.toml                      the firmware on this computer, the rig simulated
+  upright twin rigs/single-quanser-ip02.toml                  the firmware on this computer, the rig simulated
+  upright twin rigs/quadruple-paper.toml                      four links: they stand a short tug only
   upright twin rigs/quadruple-paper.toml --target qemu        the image in QEMU
   upright twin rigs/quadruple-paper.toml --target board       the image that is flashed, on the virtual board
   upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with every step left to you

@@ -50,6 +50,7 @@ function outdate(why) {
   byId('verdict').className = 'bad';
   byId('verdict').replaceChildren(...inPieces(why));
   byId('figures').textContent = 'What is drawn is the rig before.';
+  byId('figures').classList.remove('old');
   byId('unusual').replaceChildren();
   tell('');
 }

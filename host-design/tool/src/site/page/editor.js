@@ -122,7 +122,8 @@ class Form {
 
   field({ key, label, unit }) {
     const input = element('input', { id: `field-${key}`, type: 'text', inputMode: 'decimal', title: key });
-    const refuse = (why) => {
+    const refuse = (said) => {
+      const why = said.replace(`${key}: `, '');
       this.say(input, why);
       this.refused(`${label} (${unit}): ${why}`);
     };

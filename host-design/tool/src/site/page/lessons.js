@@ -18,6 +18,7 @@ class Lessons {
       lesson.name();
       return button;
     }));
+    byId('lesson-balance').addEventListener('click', () => byId('balance').click());
     byId('mark').addEventListener('click', () => this.mark());
     byId('answer').addEventListener('keydown', ({ key }) => { if (key === 'Enter') this.mark(); });
   }

@@ -227,6 +227,13 @@ impl Browser {
         controls.iter().filter(has_no_name).map(|node| node["role"]["value"].to_string()).collect()
     }
 
+    /// The upper part of the page, as wide as the window, as a PNG in the letters of RFC 4648.
+    pub(crate) fn picture(&mut self, [width, height]: [u32; 2]) -> String {
+        let clip = json!({ "x": 0, "y": 0, "width": width, "height": height, "scale": 1 });
+        let how = json!({ "format": "png", "clip": clip, "captureBeyondViewport": true });
+        self.call("Page.captureScreenshot", how)["data"].as_str().unwrap().to_owned()
+    }
+
     /// From now on, what the page saves goes into this folder.
     pub(crate) fn save_into(&mut self, folder: &Path) {
         let behaviour = json!({ "behavior": "allow", "downloadPath": folder });
