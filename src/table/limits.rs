@@ -192,11 +192,17 @@ mod tests {
 
     #[test]
     fn set_points_keep_a_tenth_of_the_rail_from_its_limits_and_position_0_always_is_one() {
-        let setpoints = |rail_m| Limits { rail_m, ..limits() }.setpoints_m();
-        assert_eq!(setpoints([-1.0, 1.0]), [-0.8, 0.8]);
-        assert_eq!(setpoints([-0.25, 1.75]), [-0.05, 1.55]);
-        assert_eq!(setpoints([-0.125, 1.875]), [0.0, 1.675]);
-        assert_eq!(setpoints([-1.875, 0.125]), [-1.675, 0.0]);
+        let near = |rail_m, wanted: [f32; 2]| {
+            let found = Limits { rail_m, ..limits() }.setpoints_m();
+            assert!(
+                found.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-6),
+                "{found:?}"
+            );
+        };
+        near([-1.0, 1.0], [-0.8, 0.8]);
+        near([-0.25, 1.75], [-0.05, 1.55]);
+        near([-0.125, 1.875], [0.0, 1.675]);
+        near([-1.875, 0.125], [-1.675, 0.0]);
         let [low, high] = Limits::<3>::none().setpoints_m();
         assert!(low < -1e38 && high > 1e38 && high.is_finite());
     }
