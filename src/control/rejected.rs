@@ -22,7 +22,7 @@ impl core::fmt::Display for Rejected {
         f.write_str(match self {
             Rejected::NoSuchLaw => "the gain table does not hold this control law",
             Rejected::Running => "the control law can only be changed while disarmed",
-            Rejected::Setpoint => "the set-point is not a finite number within the soft limits of the rail",
+            Rejected::Setpoint => "the set-point is not a finite number, or within a tenth of the usable rail of one of its soft limits",
             Rejected::NoObserver => {
                 "the gain table holds no observer: give the rig its encoders and [kalman]"
             }

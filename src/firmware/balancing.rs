@@ -53,7 +53,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let limits = &self.table.limits;
         let upright = limits.within_half_a_turn(counts);
         let lean = self.largest_lean(&upright);
-        if lean > limits.angle_rad || !self.input_inhibits().union(self.off_centre_inhibit(counts)).is_empty()
+        if lean > limits.angle_rad
+            || !self.input_inhibits().union(self.off_centre_inhibit(counts, limits.setpoints_m())).is_empty()
         {
             self.supervisor.cancel_arming();
         } else if lean > limits.arm_angle_rad {

@@ -145,9 +145,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .union(Inhibits::TABLE.when(!self.is_usable))
     }
 
-    /// Takes a commanded cart position (m), which has to be within the soft limits of the rail.
+    /// Takes a commanded cart position (m), which has to be far enough from the soft limits of the rail.
     fn take_setpoint(&mut self, position_m: f32) -> Result<(), Rejected> {
-        let [low, high] = self.table.limits.rail_m;
+        let [low, high] = self.table.limits.setpoints_m();
         if !(low..=high).contains(&position_m) {
             return Err(Rejected::Setpoint);
         }

@@ -25,7 +25,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             .inhibits_before_motor_check()
             .union(Inhibits::HELD.when(!is_released))
             .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.limits)))
-            .union(self.off_centre_inhibit(counts));
+            .union(self.off_centre_inhibit(counts, self.table.limits.rail_m));
         let answer = self.answer_to_jog(counts);
         self.supervisor.start_jogging(inhibits)?;
         self.debounce.start();

@@ -30,10 +30,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         largest
     }
 
-    /// [`Inhibits::OFF_CENTRE`] if the cart is outside the soft limits of the rail at these counts.
+    /// [`Inhibits::OFF_CENTRE`] if the cart is not between `low` and `high` (m) at these counts.
     #[inline(never)]
-    pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY]) -> Inhibits {
-        let [low, high] = self.table.limits.rail_m;
+    pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY], [low, high]: [f32; 2]) -> Inhibits {
         let step = self
             .table
             .observer
@@ -66,7 +65,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let lean = self.largest_lean(&limits.within_half_a_turn(&counts));
         self.inhibits_with_motor_off()
             .union(Inhibits::TILTED.when(lean > limits.arm_angle_rad))
-            .union(self.off_centre_inhibit(&counts))
+            .union(self.off_centre_inhibit(&counts, limits.setpoints_m()))
     }
 
     /// Inhibits of turning the motor on, whatever the posture of the links.

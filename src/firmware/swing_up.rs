@@ -68,10 +68,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         Inhibits::UNSETTLED.when(!settled).union(Inhibits::NO_ROOM.when(!self.has_room(motion, setpoint)))
     }
 
-    /// Whether `motion` stays within the soft limits of the rail when it begins at `position` (m).
+    /// Whether `motion` stays within the soft limits of the rail when it begins at `position` (m), and that is one
+    /// where the cart may be balanced.
     fn has_room(&self, motion: &MotionTable<'_>, position: f32) -> bool {
         let ([low, high], [lowest, highest]) = (self.table.limits.rail_m, motion.travel_m);
-        position + lowest >= low && position + highest <= high
+        let [first, last] = self.table.limits.setpoints_m();
+        let may_be_balanced = (first..=last).contains(&position);
+        may_be_balanced && position + lowest >= low && position + highest <= high
     }
 
     /// Begins the motion to the equilibrium `to`. `id` is that of the command.

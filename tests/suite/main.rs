@@ -20,6 +20,7 @@ mod own_board;
 mod pico;
 mod plain_equations;
 mod rig_fuzz;
+mod set_points;
 mod verdicts;
 
 use upright_test_support::published;

@@ -16,6 +16,7 @@
 //! | [`identified`] | results of an identification, as text, JSON, page and rig file |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`site`] | the whole of it in a page, with nothing to install |
+//! | [`progress`] | what a long computation tells meanwhile |
 //! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
@@ -40,6 +41,7 @@ pub mod import;
 pub mod in_the_loop;
 pub mod monitor;
 mod policy;
+pub mod progress;
 pub mod project;
 pub mod report;
 pub mod reproduce;

@@ -16,7 +16,8 @@ pub struct NoCheckout(PathBuf);
 /// A folder is neither a crate with a gain table nor in a checkout of the project; holds the folder.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{} is neither a crate with src/gains.rs nor in a checkout of Upright: give the file for the gain table with --out FILE",
+    "{} is neither a crate with src/gains.rs nor in a checkout of Upright: give the file for the gain table with --out FILE, or write \
+     none with --no-write",
     .0.display()
 )]
 pub struct NoGainTable(PathBuf);

@@ -124,6 +124,8 @@ impl Description {
             _ => (numbers, ""),
         };
         match numbers {
+            // A key that this rig does not have.
+            [] if matches!(key.absent, Absent::Required | Absent::RequiredIf(_)) => {}
             [] => {
                 let text = key.absent.to_string();
                 // The text after the semicolon is for other rigs.

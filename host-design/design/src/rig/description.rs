@@ -4,6 +4,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use upright::table::Law;
 
+use super::defaults;
 use super::sections::actuator::{Actuator, Motor};
 use super::sections::chain::{Chain, PlantDescription};
 use super::sections::friction::KnownFriction;
@@ -57,6 +58,16 @@ pub struct Rig {
 }
 
 impl Rig {
+    /// The soft limits of its rail, low and high, where the motor is turned off (m).
+    pub fn soft_rail_m(&self, chain: &Chain) -> [f64; 2] {
+        let [low, high] = chain.cart.travel_m;
+        let margin = self.limits.rail_margin_m.unwrap_or_else(|| {
+            // Position 0 stays inside the limits, however unequal the two ends are.
+            (defaults::RAIL_MARGIN_SHARE * (high - low)).min(0.5 * high.min(-low))
+        });
+        [low + margin, high - margin]
+    }
+
     /// The rig with `law` as its only control law, so that a design cannot fail because of the other one.
     pub fn with_law_alone(&self, law: Law) -> Self {
         let mut rig = self.clone();

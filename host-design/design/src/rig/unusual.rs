@@ -93,7 +93,7 @@ impl Serialize for UnusualValue {
 impl Rig {
     /// Values far from those of any bench. None of them is an error.
     pub fn unusual_values(&self) -> Vec<UnusualValue> {
-        let mut found = Found::default();
+        let mut found = UnusualValues::default();
         if let Some(chain) = self.chain() {
             found.expect_all(&CART, &chain.cart);
             for (number, link) in (1..).zip(&chain.links) {
@@ -142,11 +142,11 @@ impl Rig {
 }
 
 #[derive(Default)]
-struct Found {
+struct UnusualValues {
     unusual: Vec<UnusualValue>,
 }
 
-impl Found {
+impl UnusualValues {
     /// Compares the numbers of a section with what is usual: of a pair, its length.
     fn expect_all<T: Keys>(&mut self, section: &Section, values: &T) {
         for (key, numbers) in T::KEYS.iter().zip(values.values()) {

@@ -108,7 +108,10 @@ impl<'a> ClosedLoopRun<'a> {
         scenario: &'a Scenario,
     ) -> Result<Self, SimulationError> {
         if rig.actuator.acceleration.is_some() && scenario.sensing == Sensing::FullState {
-            return Err(SimulationError::FullState);
+            return Err(match rig.kalman {
+                Some(_) => SimulationError::FullState,
+                None => SimulationError::NoObserver,
+            });
         }
         controller.select(scenario.law)?;
         let mut bench = Bench::new(rig, scenario)?;

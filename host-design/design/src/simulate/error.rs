@@ -28,10 +28,16 @@ pub enum SimulationError {
     Offset(f64),
     /// A run with the whole state measured, of a drive that counts its own pulses.
     #[error(
-        "a drive that imposes the cart's acceleration is simulated from encoders only, because what it knows of the \
-         cart is its own pulses: add [kalman], and leave --full-state out"
+        "with kind = \"acceleration\", all that the controller knows of the cart is its own pulses, so it cannot measure \
+         the whole state: leave --full-state out"
     )]
     FullState,
+    /// The same without an observer.
+    #[error(
+        "with kind = \"acceleration\", all that the controller knows of the cart is its own pulses, so it needs an \
+         observer: add [kalman] with acceleration_noise_m2_per_s3 and joint_noise, and give each link its encoder"
+    )]
+    NoObserver,
     /// A run whose record would not fit into memory.
     #[error("a run of {duration_s} s has more than {MAX_TICKS} ticks of {period_s} s: shorten it")]
     TooLong {

@@ -47,12 +47,8 @@ fn set_limits_of_chain(
     let wanted = &rig.limits;
     let [low, high] = chain.cart.travel_m;
     let length = high - low;
-    let margin = wanted.rail_margin_m.unwrap_or_else(|| {
-        // Position 0 stays inside the limits, however unequal the two ends are.
-        (defaults::RAIL_MARGIN_SHARE * length).min(0.5 * high.min(-low))
-    });
-    limits.rail_m =
-        [finite("cart.travel_m", (low + margin) as f32)?, finite("cart.travel_m", (high - margin) as f32)?];
+    let [soft_low, soft_high] = rig.soft_rail_m(chain);
+    limits.rail_m = [finite("cart.travel_m", soft_low as f32)?, finite("cart.travel_m", soft_high as f32)?];
     let angle = wanted.angle_rad.unwrap_or(defaults::ANGLE_RAD);
     limits.angle_rad = angle as f32;
     limits.arm_angle_rad = wanted.arm_angle_rad.unwrap_or(defaults::ARM_ANGLE_SHARE * angle) as f32;

@@ -300,10 +300,11 @@ pub(crate) fn leaning(rig: &Rig, angles: &[f64]) -> Vec<f64> {
     start
 }
 
-/// Distance by which a set-point moves (m): 0.1 m, or half of the way to the nearer end of the rail.
+/// Distance by which a set-point moves (m): 0.1 m, or half of the way to the nearer end of the rail, as far as
+/// set-points may go.
 pub(crate) fn moved_setpoint_m(table: &TableValues) -> f64 {
     let [low, high] = table.limits.rail_m.map(f64::from);
-    (0.5 * high.min(-low)).min(0.1)
+    (0.5 * high.min(-low)).min(0.1).min(table.limits.setpoints_m()[1].into())
 }
 
 /// The run with a set-point that moves there and back.

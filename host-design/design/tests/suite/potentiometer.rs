@@ -33,8 +33,8 @@ fn a_link_with_a_potentiometer_is_raised_by_hand_and_balances_if_the_hand_keeps_
         let scenario = Scenario { duration_s: 5.0, ..Scenario::at_rest(&rig, Law::Lqr) };
         with_firmware(&values, |firmware| record(&rig, &values, &scenario, firmware)).unwrap()
     };
-    // From 3100 the reading falls by 2168 counts while the hand turns the link from pi to 0; from 1000 the hand turns it
-    // the other way, or the reading would fall below the lowest.
+    // From 3100 the reading falls by 2168 counts while the hand turns the link from pi to 0; from 1000 the hand turns
+    // it the other way, or the reading would fall below the lowest.
     for zero_counts in [1000, 2500, 3100, 3800] {
         let run = run(zero_counts).unwrap();
         assert!(run.fault.is_none() && run.summary.survives(), "{zero_counts}: {:?}", run.fault);

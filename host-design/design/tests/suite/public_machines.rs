@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use upright_design::design::{Design, design};
+use upright_design::design::{Cost, Design, dare, design, zero_order_hold};
+use upright_design::numerics::Matrix;
 use upright_design::rig::{PlantDescription, Rig};
 
 const PAGE: &str = include_str!("../../../../docs/coming-from-matlab.md");
@@ -84,6 +85,34 @@ fn gains_that_the_page_for_users_of_matlab_prints_are_those_of_the_design() {
         let found: Vec<f64> = (0..4).map(|state| l[(state, column)]).collect();
         assert_close(&found, &rows_of_the_page(&format!("`kalmd`, {sensor}"))[0], SIX_DIGITS);
     }
+}
+
+/// The page says so: pulses are a constant speed in a tick, which is no acceleration that is held.
+#[test]
+fn a_stepper_has_other_gains_than_its_plant_with_a_held_acceleration() {
+    assert!(PAGE.contains("A stepper holds its speed within a tick, not its acceleration"));
+    let text = with_lqr(&rig_file("single-stepper.toml"), "cost = \"sum\"");
+    let text = text.replace("period_s = 0.01", "period_s = 0.03");
+    let [_, sampled] = gains(&text);
+    // A rod of 0.1 kg and 0.5 m, on a cart whose acceleration is the input.
+    let (mass, centre, friction) = (0.1, 0.25, 1e-4);
+    let inertia = mass * 0.25 / 3.0;
+    let fall = mass * 9.81 * centre / inertia;
+    let rows = [
+        vec![0.0, 1.0, 0.0, 0.0],
+        vec![0.0; 4],
+        vec![0.0, 0.0, 0.0, 1.0],
+        vec![0.0, 0.0, fall, -friction / inertia],
+    ];
+    let push = [0.0, 1.0, 0.0, mass * centre / inertia];
+    let b = Matrix::from_fn(4, 1, |i, _| push[i]);
+    let (a, b) = zero_order_hold(&Matrix::<f64>::from_f64_rows(&rows), &b, &0.03);
+    let weights = [100.0, 10.0, 100.0, 1.0];
+    let q = Matrix::from_fn(4, 4, |i, j| if i == j { weights[i] } else { 0.0 });
+    let held = dare(&a, &b, &Cost::new(q, Matrix::from_fn(1, 1, |_, _| 0.2))).unwrap().k;
+    let differences = sampled.iter().zip(held.entries()).map(|(found, held)| (found / held - 1.0).abs());
+    let largest = differences.fold(0.0, f64::max);
+    assert!((1e-5..2e-2).contains(&largest), "{sampled:?} {held:?}: {largest}");
 }
 
 #[test]

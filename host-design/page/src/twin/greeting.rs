@@ -45,6 +45,7 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "lengths_m": lengths,
         "travel_m": travel,
         "soft_m": table.limits.rail_m,
+        "setpoints_m": table.limits.setpoints_m(),
         "angle_limit_rad": table.limits.angle_rad,
         "force_limit_n": table.force_limit_n,
         "input": if table.steps.is_some() { ["Acceleration", "m/s²"] } else { ["Force", "N"] },

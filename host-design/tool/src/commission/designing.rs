@@ -16,6 +16,7 @@ use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::record::Journal;
 use crate::identified::{json, rig_file, text};
+use crate::progress::{with_progress, with_spinner};
 
 /// Duration of the runs that the gains have to survive (s).
 const RUN_S: f64 = 10.0;
@@ -55,8 +56,8 @@ pub(super) fn identified(
 ) -> Result<Identification, Stop> {
     let settings = Settings::default();
     let logs = [(PathBuf::from("the log"), log.clone())];
-    let found =
-        identify(plan.rig, &logs, &settings, &|_| ()).map_err(|error| Stop::Machine(error.to_string()))?;
+    let found = with_progress(|progress| identify(plan.rig, &logs, &settings, progress))
+        .map_err(|error| Stop::Machine(error.to_string()))?;
     text(&plan.rig.name, &found, &settings).lines().for_each(|line| journal.found(line));
     journal.data(json(&plan.rig.name, &found));
     match &found.refusal {
@@ -134,12 +135,12 @@ fn robust(
     let survives = |law: &Law| -> Result<bool, VerifyError> {
         Ok(judge(&own.rig, &own.table, *law, tolerances, &settings, &Study::whole())?.survives())
     };
-    let all = laws.iter().map(survives).collect::<Result<Vec<_>, _>>();
+    let all = with_spinner("judging", || laws.iter().map(survives).collect::<Result<Vec<_>, _>>());
     if all.map_err(|error| Stop::Machine(error.to_string()))?.iter().all(|&survives| survives) {
         journal.found("the weights of the file survive that");
         return Ok(own);
     }
-    match choose(&own.rig, tolerances, &settings, false, &|_| ()) {
+    match with_progress(|progress| choose(&own.rig, tolerances, &settings, false, progress)) {
         Ok((choice, _)) => {
             for one in &choice.laws {
                 journal.found(format!("{}: {}", one.law, one.candidate.name));
@@ -162,7 +163,7 @@ fn robust(
 fn of_text(text: String, file: &Path) -> Result<Designed, Stop> {
     let machine = |error: &dyn std::error::Error| Stop::Machine(error.to_string());
     let rig = Rig::from_toml(&text, file).map_err(|error| machine(&error))?;
-    let certified = design(&rig).map_err(|error| machine(&error))?;
+    let certified = with_spinner("designing", || design(&rig)).map_err(|error| machine(&error))?;
     let table = TableValues::of(&rig, &certified, Gains::Sampled).map_err(|error| machine(&error))?;
     Ok(Designed { text, rig, table, certified })
 }
@@ -170,7 +171,8 @@ fn of_text(text: String, file: &Path) -> Result<Designed, Stop> {
 /// Margins, and runs with the friction that was found.
 pub(super) fn verified(journal: &mut Journal, designed: &Designed) -> Result<(), Stop> {
     let Designed { rig, table, certified, .. } = designed;
-    let report = brief(rig, certified, table).map_err(|error| Stop::Machine(error.to_string()))?;
+    let report = with_spinner("verifying", || brief(rig, certified, table))
+        .map_err(|error| Stop::Machine(error.to_string()))?;
     for check in &report.checks {
         journal.found(format!(
             "{}: {}: {}, {} required",

@@ -12,6 +12,7 @@ use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::task::PersonTask;
 use crate::monitor::words;
+use crate::progress::with_spinner;
 
 /// Time within which the firmware reports the cause of a fault.
 const CAUSE: Duration = Duration::from_millis(300);
@@ -26,7 +27,7 @@ pub(super) fn shake(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<L
     let begin = guide.machine.now();
     let mut line = OverLine::new(plan.rig, plan.table, plan.seconds, plan.seed, begin)
         .map_err(|error| Stop::Machine(error.to_string()))?;
-    let shaken = until_over(guide, &mut line);
+    let shaken = with_spinner("shaking", || until_over(guide, &mut line));
     // Whatever has ended it: the motor is turned off, and the log too.
     line.stop(guide.machine.now());
     let ended = guide.machine.exchange(&line.take_outgoing());

@@ -78,7 +78,7 @@ impl fmt::Display for PersonTask {
                  still"
             ),
             PersonTask::HandsOff => f.write_str(
-                "take your hands off the rig, with the emergency stop in one of them: the motor is going to move the cart",
+                "take your hands off the rig and hold the emergency stop: the motor is going to move the cart",
             ),
             PersonTask::Raise => f.write_str(
                 "raise the links and hold them upright and still; when the motor comes on, let go, with the emergency stop in \
@@ -86,5 +86,17 @@ impl fmt::Display for PersonTask {
             ),
             PersonTask::Catch => f.write_str("take hold of the links: the motor is going to be turned off"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hands_are_either_off_the_rig_or_at_the_emergency_stop() {
+        let text = PersonTask::HandsOff.to_string();
+        assert!(text.contains("hands off the rig and hold the emergency stop"), "{text}");
+        assert!(!text.contains("them"), "{text}");
     }
 }

@@ -81,6 +81,14 @@ pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<Path
     compile(kind, Some(&gains), &name)
 }
 
+/// Checks what the board of the image can do for this rig, as far as that is known before it is designed.
+///
+/// # Errors
+/// [`BuildError`] if the board counts too few encoders, or cannot make the tick.
+pub fn check_rig(kind: ImageKind, rig: &Rig) -> Result<(), BuildError> {
+    check_board(kind, rig.sensors().len(), rig.tick.period_s, None)
+}
+
 /// Checks what the board of the image can do before the compiler is started, whose errors name lines of the image.
 fn check_board(
     kind: ImageKind,

@@ -24,7 +24,7 @@ mod stack;
 mod uf2;
 
 pub use board::{BoardName, NoBoard};
-pub use build::{ImageKind, PROFILE, build, build_for};
+pub use build::{ImageKind, PROFILE, build, build_for, check_rig};
 pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler, compiler_for_chips};
 pub(crate) use compiler::{ForeignTarget, compiler_for};
@@ -32,7 +32,7 @@ pub use elf::{ElfError, LinkedImage};
 pub use error::{BuildError, NoCompiler, TARGET};
 pub use facts::{BoardFacts, board_facts};
 pub use forbidden::{forbidden_functions, forbidden_in_handlers, wrong_functions};
-pub use pico::{PicoImage, build_pico};
+pub use pico::{PicoImage, build_pico, check_rig_for_pico};
 pub use pico_board::PicoBoard;
 pub use pico_limits::{PICO_BALANCING_CYCLES, PICO_ENCODERS, PICO_MOTION_CYCLES, PICO_TICK_S, PicoError};
 pub use size::{CODE_LIMIT, ImagePart, PICO_CODE_LIMIT, RAM_LIMIT, Size, SizeError, size};

@@ -10,7 +10,7 @@ use super::checksum::with_reference;
 use super::compiler::{Compiler, compiler_for_chips};
 use super::error::BuildError;
 use super::pico_board::PicoBoard;
-use super::pico_limits::check;
+use super::pico_limits::{PicoError, check};
 use super::uf2::uf2;
 use crate::project::checkout;
 
@@ -21,6 +21,14 @@ pub struct PicoImage {
     pub elf: PathBuf,
     /// For the drive that the board shows while BOOTSEL is held.
     pub uf2: PathBuf,
+}
+
+/// Checks what a board can do for this rig, as far as that is known before it is designed.
+///
+/// # Errors
+/// [`PicoError`] if the board counts too few encoders, or cannot make the tick.
+pub fn check_rig_for_pico(board: PicoBoard, rig: &Rig) -> Result<(), PicoError> {
+    check(board, rig.sensors().len(), rig.tick.period_s, false, None)
 }
 
 /// Builds the image for this board with the table of `rig`.

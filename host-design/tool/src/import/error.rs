@@ -67,6 +67,12 @@ pub enum ImportError {
         /// What is needed.
         needed: &'static str,
     },
+    /// The first joint turns about a vertical axis.
+    #[error(
+        "joint {0:?} turns about a vertical axis: this is a rotary pendulum, no cart on a rail. Near upright it is a cart in \
+         other numbers: see \"A rotary base\" in docs/other-machines.md"
+    )]
+    Rotary(String),
     /// A joint points in a direction that the chain does not allow.
     #[error("joint {joint:?}: its axis has to be {needed}")]
     Axis {

@@ -47,6 +47,10 @@ impl<'r> Machine<'r> {
         let parts = parts(robot)?;
         let [_, cart, hinged @ ..] = &parts[..] else { return Err(ImportError::TooShort("prismatic joint")) };
         let Some(slide) = cart.joint else { return Err(ImportError::TooShort("prismatic joint")) };
+        let turns = ["continuous", "revolute"].contains(&slide.kind.as_str());
+        if turns && cart.axis().cross(&Vector3::z()).norm() < SAME {
+            return Err(ImportError::Rotary(slide.name.clone()));
+        }
         if slide.kind != "prismatic" {
             let needed = "prismatic, for the cart on its rail";
             return Err(ImportError::Type { joint: slide.name.clone(), kind: slide.kind.clone(), needed });

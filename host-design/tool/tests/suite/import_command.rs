@@ -104,6 +104,24 @@ fn another_machine_is_refused_with_the_name_of_the_joint() {
     );
 }
 
+/// An arm that turns about a vertical axis, with a link at its end.
+#[test]
+fn a_rotary_pendulum_is_told_so() {
+    let rotary = |kind: &str| {
+        let slide =
+            DOUBLE.replace("name=\"slide\" type=\"prismatic\"", &format!("name=\"slide\" type=\"{kind}\""));
+        slide.replace("<axis xyz=\"1 0 0\"/>", "<axis xyz=\"0 0 -1\"/>")
+    };
+    for kind in ["continuous", "revolute"] {
+        let error = rig_file(&rotary(kind), "x.urdf").unwrap_err().to_string();
+        assert!(error.contains("joint \"slide\" turns about a vertical axis"), "{error}");
+        assert!(error.contains("docs/other-machines.md"), "{error}");
+    }
+    // Negative control: a slide along the vertical is another machine.
+    let error = rig_file(&rotary("prismatic"), "x.urdf").unwrap_err().to_string();
+    assert!(error.contains("its axis has to be level"), "{error}");
+}
+
 #[test]
 fn the_command_writes_a_rig_file_that_can_be_designed() {
     let folder = tempfile::tempdir().unwrap();

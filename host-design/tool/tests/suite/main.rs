@@ -14,6 +14,7 @@ mod documented_tables;
 mod documents;
 mod equipment;
 mod first_power_up;
+mod first_words;
 mod identify_command;
 mod image;
 mod import_command;

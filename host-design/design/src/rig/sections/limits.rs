@@ -27,7 +27,7 @@ keys! {
             "largest speed of the cart", Absent::Follows("no limit");
         rail_margin_m: Option<f64>, "m",
             Rule::NOT_NEGATIVE.worded("a number >= 0, less than from 0 to either end of travel_m"),
-            "distance from an end of the rail at which the motor is turned off and beyond which no set-point is accepted",
+            "distance from an end of the rail at which the motor is turned off; set-points end a tenth of the remaining rail before",
             Absent::Follows("2.5 % of the rail");
         travel_tolerance_m: Option<f64>, "m", Rule::POSITIVE,
             "allowed difference between the length of travel_m and the distance between the limit switches",

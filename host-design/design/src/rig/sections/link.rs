@@ -115,7 +115,7 @@ const LINK_KEYS: &[Key] = &[
         name: "sensor_zero_counts",
         unit: "counts",
         rule: Rule::WHOLE.worded("a whole number from 0 to below 2^sensor_bits"),
-        meaning: "what this sensor reads while the links hang at rest",
+        meaning: "reading of this sensor while the links hang at rest",
         absent: Absent::Numbers(&[0.0]),
     },
     Key {
@@ -357,7 +357,8 @@ fn within_travel(table: &Table<'_>, range: f64, travel_rad: f64, is_lowest: bool
         false => format!("a whole number from {a} to {d}"),
     };
     let remedy = "turn the potentiometer so that it reads where the link hangs and where it is upright";
-    Err(table.required("sensor_zero_counts")?.out_of_range(&accepts, remedy))
+    let needed = "the reading of the potentiometer while the links hang at rest, in counts: at 0 it is in its dead band";
+    Err(table.need("sensor_zero_counts", needed)?.out_of_range(&accepts, remedy))
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ impl CheckCommand {
             return Ok(write!(std::io::stdout(), "{}", key_table())?);
         };
         let rig = Rig::from_path(&file)?;
-        warn_of_unusual_values(&rig);
+        warn_of_unusual_values(&rig, &file);
         print(self.json, &rig, || rig.describe())
     }
 }

@@ -13,8 +13,8 @@ use upright_tool::compare::{
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::with_bar;
 use crate::variation::{finite, law_option, positive};
+use upright_tool::progress::with_bar;
 
 /// Compares designs: several rigs, or one key of a rig file swept over a range.
 ///
@@ -39,10 +39,10 @@ pub(crate) struct CompareCommand {
     #[arg(long, value_parser = law_option())]
     law: Option<Law>,
     /// Step of the set-point (m)
-    #[arg(long, default_value_t = 0.1, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, default_value_t = 0.1, value_name = "M", value_parser = finite)]
     step: f64,
     /// Duration of each run (s)
-    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = positive)]
     duration: f64,
     /// Give the controller the whole state instead of encoder counts
     #[arg(long)]

@@ -10,9 +10,9 @@ use upright_design::study::Study;
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::not_negative;
+use upright_tool::progress::with_bar;
 
 /// Shakes and identifies simulated machines that differ from the rig file, and counts how many 95 % intervals cover
 /// the true values.

@@ -6,7 +6,7 @@ use clap::Args;
 use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, simulate};
+use upright_design::simulate::{Scenario, SimulationError, simulate};
 use upright_design::swing_up::{Stored, SwingUpError};
 use upright_design::table::{Gains, TableValues, gains_source, identity_differences, write_atomically};
 use upright_tool::image::BoardName;
@@ -14,9 +14,9 @@ use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
 use crate::output::{print, warn_of_unusual_values};
-use crate::progress::with_spinner;
 use crate::variation::{Wanted, with_stored_motions};
 use law_report::LawReport;
+use upright_tool::progress::with_spinner;
 
 mod data;
 mod law_report;
@@ -60,6 +60,12 @@ pub(crate) struct DesignCommand {
 impl DesignCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        // Before the work, which is in vain where there is no place for its result.
+        let path = match (self.no_write, &self.out) {
+            (true, _) => None,
+            (false, Some(out)) => Some(out.clone()),
+            (false, None) => Some(gain_table().map_err(|error| Failure::argument(error.to_string()))?),
+        };
         let name = || self.rig.display().to_string();
         let (certified, poles, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
             let failed = |source| Failure::of(name(), source);
@@ -76,12 +82,13 @@ impl DesignCommand {
         for warning in text::warnings(&rig, &certified, &reports, table.as_ref().ok()) {
             eprintln!("warning: {warning}");
         }
-        warn_of_unusual_values(&rig);
+        warn_of_unusual_values(&rig, &self.rig);
         refuse_failing_table(&rig, &reports)?;
-        if self.no_write {
-            return Ok(());
-        }
+        let Some(path) = path else { return Ok(()) };
         let mut table = table.map_err(|source| Failure::of(name(), source))?;
+        if reports.iter().any(|report| report.run.is_none()) {
+            return Err(Failure::of(name(), SimulationError::NoObserver));
+        }
         if self.swing_up || self.transitions {
             table = with_stored_motions(&self.rig, &rig, table, Wanted::of(self.transitions))?;
         }
@@ -91,8 +98,6 @@ impl DesignCommand {
         }
         warn_of_tick(&rig);
         let source = gains_source(&rig, &table);
-        let path =
-            self.out.map_or_else(gain_table, Ok).map_err(|error| Failure::argument(error.to_string()))?;
         if self.check {
             return check(&path, &source);
         }
@@ -118,7 +123,10 @@ fn report(
         let run = match table {
             Some(table) => {
                 let scenario = Scenario::acceptance(rig, law, slowest_time_constant(rig, poles, law));
-                Some(simulate(rig, table, &scenario)?.1)
+                match simulate(rig, table, &scenario) {
+                    Err(SimulationError::NoObserver) => None,
+                    run => Some(run?.1),
+                }
             }
             None => None,
         };

@@ -9,9 +9,9 @@ use upright_design::study::Study;
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::with_bar;
 use crate::split::Split;
 use crate::variation::{Variation, law_option, positive};
+use upright_tool::progress::with_bar;
 
 /// Balances machines without a defect with the whole firmware, and counts false alarms: how many are turned off. Exit
 /// status 1 if any is.

@@ -10,9 +10,9 @@ use upright_design::table::write_atomically;
 use upright_tool::identified::{json, page, rig_file, text};
 
 use crate::failure::Failure;
-use crate::progress::with_progress;
 use crate::reading::ReadingArgs;
 use crate::variation::positive;
+use upright_tool::progress::with_progress;
 
 /// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its
 /// motion.

@@ -13,7 +13,6 @@ mod firmware;
 mod identify;
 mod import;
 mod output;
-mod progress;
 mod reading;
 mod report;
 mod reproduce;
@@ -31,7 +30,7 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -90,8 +89,19 @@ enum UprightCommand {
     Verify(verify::VerifyCommand),
 }
 
+/// Lets every option of a command take a number below 0, so that what refuses it says what is accepted.
+fn with_negative_numbers(command: Command) -> Command {
+    let takes_number = |arg: Arg| {
+        let is_option = !arg.is_positional() && arg.get_action().takes_values();
+        if is_option { arg.allow_negative_numbers(true) } else { arg }
+    };
+    command.mut_args(takes_number).mut_subcommands(with_negative_numbers)
+}
+
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let matches = with_negative_numbers(Arguments::command()).get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let result = match arguments.command {
         UprightCommand::Check(command) => command.run(),
         UprightCommand::Commission(command) => command.run(),
         UprightCommand::Design(command) => command.run(),

@@ -1,6 +1,7 @@
 //! What a command prints as its result.
 
 use std::io::Write;
+use std::path::Path;
 
 use serde::Serialize;
 use upright_design::rig::Rig;
@@ -20,9 +21,22 @@ pub(crate) fn print(
     Ok(std::io::stdout().lock().write_all(text.as_bytes())?)
 }
 
-/// Warns of values that no bench has.
-pub(crate) fn warn_of_unusual_values(rig: &Rig) {
+/// Warns of values that no bench has, with their lines in the rig file.
+pub(crate) fn warn_of_unusual_values(rig: &Rig, file: &Path) {
+    let text = std::fs::read_to_string(file).unwrap_or_default();
     for value in rig.unusual_values() {
-        eprintln!("warning: {value}");
+        let line = value.line(&text).map_or_else(String::new, |line| format!(":{line}"));
+        eprintln!("warning: {}{line}: {value}", file.display());
+    }
+}
+
+/// Warns of a motion that is planned for a cart that may be an arm.
+pub(crate) fn warn_of_an_arm(rig: &Rig) {
+    if rig.may_be_an_arm() {
+        eprintln!(
+            "warning: the rail is shorter than one turn of the pulley: if the cart is an arm that turns about a vertical \
+             axis, no motion far from upright fits it, because the plant has no centrifugal force (\"A rotary base\" in \
+             docs/other-machines.md)"
+        );
     }
 }

@@ -9,7 +9,7 @@ use upright_tool::reproduce::{PaperRigs, reproduce};
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::with_progress;
+use upright_tool::progress::with_progress;
 
 /// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures
 /// and data.

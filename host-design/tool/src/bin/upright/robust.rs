@@ -13,9 +13,9 @@ use upright_tool::figure::front_figure;
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_progress, with_spinner};
 use crate::split::Split;
 use crate::variation::{not_negative, positive, with_table};
+use upright_tool::progress::{with_progress, with_spinner};
 
 mod text;
 

@@ -16,9 +16,10 @@ use upright_tool::in_the_loop::run_shaken;
 use upright_tool::monitor::{SerialLine, now};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
+use crate::output::warn_of_an_arm;
 use crate::target::TargetOption;
 use crate::variation::with_table;
+use upright_tool::progress::with_spinner;
 
 /// Shakes the hanging machine, and writes its log for `upright identify`.
 ///
@@ -62,6 +63,7 @@ const LAST_WAIT: Duration = Duration::from_millis(500);
 impl ShakeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        warn_of_an_arm(&rig);
         let log = self.shaken(&rig)?;
         write_atomically(&self.log, &log.to_bytes())?;
         let angles = log.deviations();

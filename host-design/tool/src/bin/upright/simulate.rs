@@ -14,8 +14,8 @@ use upright_tool::figure::run_svg;
 use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
 use crate::variation::{Variation, Wanted, finite, law_option, not_negative, positive, with_stored_motions};
+use upright_tool::progress::with_spinner;
 
 /// Runs the firmware's own controller against the nonlinear plant.
 ///
@@ -38,10 +38,10 @@ pub(crate) struct SimulateCommand {
     #[arg(long, value_parser = law_option(), default_value = Law::Lqr.option())]
     law: Law,
     /// Duration of the run (s)
-    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = positive)]
     duration: f64,
     /// Step of the set-point (m)
-    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, default_value_t = 0.0, value_name = "M", value_parser = finite)]
     step: f64,
     /// When the set-point steps (s)
     #[arg(long, default_value_t = 0.0, value_name = "S", value_parser = not_negative)]
@@ -53,10 +53,10 @@ pub(crate) struct SimulateCommand {
     #[arg(long, value_enum)]
     sensing: Option<SensingName>,
     /// Initial angles of the links, from the cart outwards (rad); missing ones are 0
-    #[arg(long, value_delimiter = ',', value_name = "RAD,…", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, value_delimiter = ',', value_name = "RAD,…", value_parser = finite)]
     tilt: Vec<f64>,
     /// The whole initial state: x, xdot, theta1, theta1dot … (SI), instead of --tilt
-    #[arg(long, value_delimiter = ',', value_name = "X,…", allow_negative_numbers = true, value_parser = finite, conflicts_with = "tilt")]
+    #[arg(long, value_delimiter = ',', value_name = "X,…", value_parser = finite, conflicts_with = "tilt")]
     start: Vec<f64>,
     /// Disturbances: none, or the paper's force of 0.1 N rms and joint torques of 3.16e-5 N·m rms
     #[arg(long, value_enum, default_value_t = DisturbanceOptions::None)]
@@ -68,7 +68,7 @@ pub(crate) struct SimulateCommand {
     #[arg(long, value_name = "NM", value_parser = not_negative)]
     torque_noise: Option<f64>,
     /// Constant disturbing force on the cart, as from a tilted rail (N)
-    #[arg(long, default_value_t = 0.0, value_name = "N", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, default_value_t = 0.0, value_name = "N", value_parser = finite)]
     force_offset: f64,
     /// Seed of the disturbances
     #[arg(long, default_value_t = 1)]

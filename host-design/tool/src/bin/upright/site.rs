@@ -8,7 +8,7 @@ use upright_tool::project::checkout;
 use upright_tool::site::{examples, lessons, module, page};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
+use upright_tool::progress::with_spinner;
 
 /// Writes a page that designs rigs in the browser, with nothing to install.
 ///

@@ -19,9 +19,9 @@ use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, tra
 use upright_tool::in_the_loop::RunError;
 
 use crate::failure::Failure;
-use crate::output::print;
-use crate::progress::{with_bar, with_progress, with_spinner};
+use crate::output::{print, warn_of_an_arm};
 use crate::split::Split;
+use upright_tool::progress::{with_bar, with_progress, with_spinner};
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///
@@ -145,6 +145,7 @@ impl SwingUpCommand {
 
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        warn_of_an_arm(&rig);
         let failed = |source: SwingUpError| Failure::of(&rig.name, source);
         if self.table {
             // The outcome depends on the motions as well as on the rig file.

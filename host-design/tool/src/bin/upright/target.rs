@@ -10,7 +10,7 @@ use upright_tool::image::{self, BoardName, ImageKind};
 use upright_tool::in_the_loop::{PinLink, RunPlace};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
+use upright_tool::progress::with_spinner;
 
 /// The board that the virtual board simulates.
 const BOARD: BoardName = BoardName::WeactF405;

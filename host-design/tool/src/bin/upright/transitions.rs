@@ -15,8 +15,8 @@ use upright_design::swing_up::{
 use upright_design::table::write_atomically;
 
 use crate::failure::Failure;
-use crate::output::print;
-use crate::progress::{with_progress, with_spinner};
+use crate::output::{print, warn_of_an_arm};
+use upright_tool::progress::{with_progress, with_spinner};
 
 /// Plans motions between any two equilibria, in which each link is up or down, and tries them one after the other.
 ///
@@ -63,6 +63,7 @@ fn numbers(text: &str) -> Result<(u64, u64), String> {
 impl TransitionsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        warn_of_an_arm(&rig);
         let links = rig.links();
         let swing_up = Stored::beside(&self.rig)
             .and_then(|stored| motions(&rig, &stored))

@@ -11,7 +11,7 @@ use upright_design::swing_up::{Stored, StoredTransitions, SwingUpError, motions,
 use upright_design::table::{Gains, TableValues};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
+use upright_tool::progress::with_spinner;
 
 #[derive(Args)]
 pub(crate) struct Variation {
@@ -21,13 +21,13 @@ pub(crate) struct Variation {
     #[arg(long, value_enum, default_value_t = GainsName::Sampled)]
     gains: GainsName,
     /// Control period instead of the rig's (s); the gains are redesigned
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = period)]
+    #[arg(long, value_name = "S", value_parser = period)]
     tick: Option<f64>,
     /// Delay instead of the rig's (ticks); the gains are redesigned
     #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(0..=1))]
     delay: Option<u8>,
     /// Force limit instead of the rig's (N)
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = positive)]
     force_limit: Option<f64>,
 }
 

@@ -16,9 +16,9 @@ use upright_design::verify::{
 
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::{with_bar, with_progress, with_spinner};
 use crate::split::Split;
 use crate::variation::{Variation, law_option};
+use upright_tool::progress::{with_bar, with_progress, with_spinner};
 
 mod imperfections;
 mod text;
@@ -60,7 +60,7 @@ pub(crate) struct VerifyCommand {
     #[arg(long, conflicts_with_all = ["replay", "map", "shard", "merge"])]
     imperfections: bool,
     /// With --map: two states and their ranges, as index:from:to (SI; state order x, xdot, theta1, theta1dot …)
-    #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", allow_negative_numbers = true,
+    #[arg(long, value_name = "S:A:B", num_args = 2, value_delimiter = ',', requires = "map", 
           value_parser = axis, default_values = ["2:-0.5:0.5", "3:-4:4"])]
     axes: Vec<MapAxis>,
     /// Share of the random plants with one more tick of delay than designed for (0 to 1)

@@ -154,7 +154,7 @@ export class Controls {
     document.querySelectorAll('.swing-up').forEach((element) => { element.hidden = !hello.has_swing_up; });
     byId('law').replaceChildren(...hello.laws.map(({ name, title }) => option(name, title)));
     this.laws = hello.laws;
-    [byId('setpoint').min, byId('setpoint').max] = hello.soft_m;
+    [byId('setpoint').min, byId('setpoint').max] = hello.setpoints_m;
     byId('steps').replaceChildren(...STEPS.map((textContent) => Object.assign(document.createElement('li'), { textContent })));
   }
 

@@ -28,7 +28,7 @@ const ask = connect({
     view = new RigView(byId('rig'), byId('rail'), hello, {
       pull: (body, along, x, y) => controls.machine({ do: 'pull', body, along, x, y }),
       letGo: () => controls.machine({ do: 'let-go' }),
-      moveTo: (x) => controls.say(`set-point ${Math.min(hello.soft_m[1], Math.max(hello.soft_m[0], x)).toFixed(4)}`),
+      moveTo: (x) => controls.say(`set-point ${Math.min(hello.setpoints_m[1], Math.max(hello.setpoints_m[0], x)).toFixed(4)}`),
     });
     controls.hello(hello, scopes);
     drawers.hello(hello);

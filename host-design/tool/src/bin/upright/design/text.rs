@@ -62,6 +62,12 @@ fn write_design(
         }
         match &report.run {
             Some(run) => writeln!(out, "  closed loop, firmware against {plant}: {run}")?,
+            None if rig.actuator.acceleration.is_some() && rig.kalman.is_none() => {
+                writeln!(
+                    out,
+                    "  no closed loop: a drive that counts its own pulses needs an observer, [kalman]"
+                )?;
+            }
             None => writeln!(out, "  no closed loop: this design makes no table")?,
         }
     }

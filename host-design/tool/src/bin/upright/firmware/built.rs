@@ -7,15 +7,17 @@ use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{self, ImageKind, PicoBoard, PicoImage};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
 use crate::variation::{Wanted, with_stored_motions, with_table};
+use upright_tool::progress::with_spinner;
 
 /// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
 pub(super) fn built(kind: ImageKind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
         return Ok(with_spinner("building the image", || image::build(kind))?);
     };
-    let (rig, table) = designed(path, wanted)?;
+    let rig = Rig::from_path(path)?;
+    image::check_rig(kind, &rig)?;
+    let table = table_of(&rig, path, wanted)?;
     Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
 }
 
@@ -29,6 +31,7 @@ pub(super) fn built_for_pico(
         return Err(Failure::argument("name a rig file: an image for a pico is built from one"));
     };
     let rig = Rig::from_path(path)?;
+    image::check_rig_for_pico(board, &rig)?;
     let table = table_of(&rig, path, wanted)?;
     Ok(with_spinner("building the image", || image::build_pico(board, &rig, &table))?)
 }

@@ -20,9 +20,9 @@ use super::board::BoardOption;
 use super::built::designed;
 use crate::failure::Failure;
 use crate::output::print;
-use crate::progress::with_spinner;
 use crate::target::read;
 use crate::variation::{Wanted, law_option, positive};
+use upright_tool::progress::with_spinner;
 
 /// Measures what the ticks of the flashed image cost, on the virtual board: latency from the tick to the output,
 /// jitter of the output, and the whole task by part. The run goes from power-up through arming to balancing, and

@@ -12,9 +12,9 @@ use upright_design::table::TableValues;
 use upright_tool::in_the_loop::{PinLink, RunError, RunPlace, VirtualBoard, run, run_compared, serve};
 
 use crate::failure::Failure;
-use crate::progress::with_spinner;
 use crate::simulate::SimulateCommand;
 use crate::target::TargetOption;
+use upright_tool::progress::with_spinner;
 
 /// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
 /// firmware on the host; exit status 1 if the pendulum falls or a bit differs.
