@@ -302,7 +302,7 @@ fn counted_checks(trust: &LawTrust) -> Vec<Check> {
         Check::all_survive(law, requirement, noise.runs as f64, noise.survived as f64)
     });
     let imperfections = trust.imperfections.iter().map(|required| {
-        let (runs, within) = (required.runs as f64, required.verdict.stayed_on as f64);
+        let (runs, within) = (required.verdict.runs as f64, required.verdict.stayed_on as f64);
         Check::all_survive(law, required.requirement, runs, within)
     });
     corners.into_iter().chain(nominal).chain(tolerated).chain(imperfections).collect()
