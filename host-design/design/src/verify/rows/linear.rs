@@ -74,7 +74,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
         name: "least resonance",
         meaning: "frequency to which the resonance of a step motor with the cart may fall before the loop, which does not know \
-                  of it, is unstable; damping ratio 0.1",
+                  of it, is unstable; its damping is `motor_damping_percent` of `[reality]`",
         values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.resonance_hz?)))),
     },
     TrustQuantity {
