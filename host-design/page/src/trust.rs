@@ -96,7 +96,7 @@ fn typical(
     let mut said = Vec::new();
     for size in [poor, good] {
         let runs = of_size(rig, table, trust.linear.law, &settings, imperfection, size)?;
-        said.push(format!("{} {}: {}", significant(size, 2), imperfection.unit, runs.text(settings.seeds)));
+        said.push(format!("{} {}: {}", significant(size, 2), imperfection.unit, runs.text()));
         if runs.ended_by.is_none() {
             break;
         }

@@ -7,8 +7,7 @@ use super::Design;
 use crate::numerics::{Matrix, Real, exponential, spectral_radius};
 use crate::rig::Rig;
 
-/// Damping ratio of a step motor's resonance, and of a servo of second order.
-const DAMPING: f64 = 0.1;
+/// Damping ratio of a servo of second order.
 const SERVO_DAMPING: f64 = 0.7;
 /// Fastest and slowest drive that are tried (Hz), and the ratio from one to the next.
 const SPEEDS_HZ: [f64; 2] = [5e3, 0.1];
@@ -17,7 +16,8 @@ const RATIO: f64 = 1.03;
 /// How slow the drive may be, and how fast, for the linear loop of the LQR, without integral action, to be stable.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct DriveLimits {
-    /// Least resonance of a step motor with the cart (Hz); none for a servo with a bandwidth.
+    /// Least resonance of a step motor with the cart (Hz), with the damping of `[reality]`; none for a servo with a
+    /// bandwidth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resonance_hz: Option<f64>,
     /// Least bandwidth of a servo that follows its speed with a lag of first order (Hz).
@@ -38,7 +38,8 @@ impl DriveLimits {
         let drive = rig.actuator.acceleration.as_ref()?;
         let of = |follower: Follower| is_stable(rig, design, follower).unwrap_or(false);
         let servo = |rate: f64| of(Follower::Spring([0.0, rate]));
-        let motor = |rate: f64| of(Follower::Spring([rate * rate, 2.0 * DAMPING * rate]));
+        let damping = 0.01 * rig.reality.step_motor.motor_damping_percent;
+        let motor = |rate: f64| of(Follower::Spring([rate * rate, 2.0 * damping * rate]));
         let second_order = |rate: f64| of(Follower::SecondOrder(rate));
         let [fastest_hz, slowest_hz] = SPEEDS_HZ;
         let Some(designed_hz) = drive.bandwidth_hz else {

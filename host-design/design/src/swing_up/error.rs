@@ -35,6 +35,21 @@ pub enum SwingUpError {
         /// What would help.
         help: String,
     },
+    /// So many runs cannot show the required share, even if all of them arrive.
+    #[error(
+        "success_percent in [swing_up]: {runs} random runs judge a motion, which are too few to show {needed} %: at least \
+         {fewest} are needed; give at most {most:.1}"
+    )]
+    TooFewRuns {
+        /// Lower end needed (%).
+        needed: f64,
+        /// Runs made.
+        runs: usize,
+        /// Runs with which it could be shown.
+        fewest: usize,
+        /// Largest lower end that the runs can show (%).
+        most: f64,
+    },
     /// Not enough random runs arrive.
     #[error(
         "{transition}: {arrived} of {runs} random runs arrive, and the lower end of the 95 % interval has to be {needed} \

@@ -9,11 +9,12 @@ use super::SwingUpError;
 use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
+use super::robustness::JUDGING_RUNS;
 use super::tracking::{Noise, PathFilter, stationary};
 use crate::motion::{Transition, rest};
 use crate::numerics::Matrix;
 use crate::rig::{Chain, KalmanNoise, Motor, Rig, Sensor, SwingUpRules};
-use crate::verify::Disturbance;
+use crate::verify::{Disturbance, fewest_runs, wilson};
 
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
 /// than at rest.
@@ -59,6 +60,17 @@ pub(super) struct AtRest {
     pub(super) covariance: Matrix<f64>,
 }
 
+/// Whether the runs that judge a motion can show this share, if all of them arrive.
+fn can_be_judged(needed: f64) -> Result<(), SwingUpError> {
+    let (runs, most) = (JUDGING_RUNS, 100.0 * wilson(JUDGING_RUNS, JUDGING_RUNS)[0]);
+    if needed <= most {
+        return Ok(());
+    }
+    // One decimal, so that what is said is enough.
+    let most = (10.0 * most).floor() / 10.0;
+    Err(SwingUpError::TooFewRuns { needed, runs, fewest: fewest_runs(0, 0.01 * needed), most })
+}
+
 impl<'a> Setting<'a> {
     /// The setting for raising and lowering.
     pub(super) fn of(rig: &'a Rig) -> Result<Self, SwingUpError> {
@@ -84,6 +96,7 @@ impl<'a> Setting<'a> {
         let drive = rig.actuator.acceleration.as_ref();
         let steps: Vec<f64> = sensors.iter().map(|sensor| sensor.step()).collect();
         let rules = rig.swing_up.clone().unwrap_or_default();
+        can_be_judged(rules.success_percent)?;
         let errors = |sensor: &Sensor| (sensor.state, sensor.variance());
         let noise = noise(chain, kalman, &rules, sensors.iter().map(errors).collect());
         let weights = Matrix::from_f64_rows(&lqr.weights().0);

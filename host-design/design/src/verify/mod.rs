@@ -68,7 +68,9 @@ pub use lag::LagLimits;
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
-pub use monte_carlo::{Effort, MonteCarlo, Spread, WorstCase, monte_carlo, sample, spread, wilson};
+pub use monte_carlo::{
+    Effort, MonteCarlo, Spread, WorstCase, fewest_runs, monte_carlo, sample, spread, wilson,
+};
 pub use noise_runs::{Endurance, LimitShare, MeasuredRipple, NoiseRun, corner_noise, endurance, noise_run};
 pub use pushes::{PushSearch, PushSurvival, pushes};
 pub use report::{Check, LawTrust, TrustReport, brief, trust};

@@ -181,6 +181,29 @@ pub fn monte_carlo(
     })
 }
 
+impl MonteCarlo {
+    /// If these runs cannot decide whether at least this share survives, because it lies within their interval: the
+    /// fewest runs that could show that it does, with as many falls.
+    pub fn fewest_to_decide(&self, share: f64) -> Option<usize> {
+        let [low, high] = self.interval;
+        (low < share && share <= high).then(|| fewest_runs(self.runs - self.survived, share))
+    }
+}
+
+/// The fewest runs of which the lower end of the 95 % interval reaches `share` (below 1) if `lost` of them fail.
+pub fn fewest_runs(lost: usize, share: f64) -> usize {
+    let is_enough = |runs: usize| wilson(runs.saturating_sub(lost), runs)[0] >= share;
+    let (mut few, mut enough) = (lost, lost + 1);
+    while !is_enough(enough) {
+        (few, enough) = (enough, 2 * enough);
+    }
+    while enough - few > 1 {
+        let middle = few + (enough - few) / 2;
+        if is_enough(middle) { enough = middle } else { few = middle }
+    }
+    enough
+}
+
 /// The 95 % confidence interval of a share of which `successes` of `runs` were seen, after E. B. Wilson, "Probable
 /// inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22 (1927) 209-212. It does not
 /// shrink to a point when every run succeeds.
@@ -211,5 +234,34 @@ mod tests {
         assert!(close(wilson(8, 10), [0.490162, 0.943318]), "{:?}", wilson(8, 10));
         assert!(close(wilson(10, 10), [0.722467, 1.0]), "{:?}", wilson(10, 10));
         assert!(close(wilson(0, 10), [0.0, 0.277533]), "{:?}", wilson(0, 10));
+    }
+
+    #[test]
+    fn the_fewest_runs_are_the_first_whose_lower_bound_reaches_the_share() {
+        for (lost, share, fewest) in [(0, 0.95, 73), (0, 0.93, 52), (0, 0.99, 381)] {
+            assert_eq!(fewest_runs(lost, share), fewest);
+        }
+        for (lost, share) in [(0, 0.5), (1, 0.95), (10, 0.95), (3, 0.7)] {
+            let fewest = fewest_runs(lost, share);
+            assert!(wilson(fewest - lost, fewest)[0] >= share, "{lost} {share}");
+            assert!(wilson(fewest - lost - 1, fewest - 1)[0] < share, "{lost} {share}");
+        }
+    }
+
+    #[test]
+    fn runs_decide_if_the_share_is_outside_of_their_interval() {
+        let of = |survived: usize, runs: usize| MonteCarlo {
+            base_seed: 1,
+            runs,
+            survived,
+            success_rate: survived as f64 / runs as f64,
+            interval: wilson(survived, runs),
+            worst: None,
+        };
+        assert_eq!(of(20, 20).fewest_to_decide(0.95), Some(73));
+        assert_eq!((of(73, 73).fewest_to_decide(0.95), of(200, 200).fewest_to_decide(0.95)), (None, None));
+        // Clearly too many falls are decided, some falls are not.
+        assert_eq!((of(10, 20).fewest_to_decide(0.95), of(0, 1).fewest_to_decide(0.95)), (None, None));
+        assert!(of(190, 200).fewest_to_decide(0.95).is_some_and(|fewest| fewest > 200));
     }
 }

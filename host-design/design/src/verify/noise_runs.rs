@@ -54,39 +54,44 @@ pub struct MeasuredRipple {
     pub limit_share: LimitShare,
 }
 
-/// Largest share of each limit at which the supervisor turns the motor off; 0 without that limit.
+/// Largest share of each limit at which the supervisor turns the motor off; none without that limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct LimitShare {
     /// Of the way from the set-point to the limit of the rail.
-    pub rail: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rail: Option<f64>,
     /// Of the angle of any link from the vertical.
-    pub angle: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
     /// Of the cart's speed.
-    pub speed: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f64>,
 }
 
 impl LimitShare {
-    /// The largest of the three.
-    pub fn largest(self) -> f64 {
-        self.rail.max(self.angle).max(self.speed)
+    /// The largest of the three; none without a limit.
+    pub fn largest(self) -> Option<f64> {
+        most(most(self.rail, self.angle), self.speed)
     }
 
     fn of(limits: &Limits<MAX_SENSORS>, state: &[f64]) -> Self {
         let &[position, speed, ..] = state else { return Self::default() };
-        let ends = limits.rail_m.map(|end| position / f64::from(end));
+        // In the table, a limit that is not there is the largest number.
+        let share = |of: f64, limit: f32| (limit.abs() < f32::MAX).then(|| of / f64::from(limit));
+        let [low, high] = limits.rail_m.map(|end| share(position, end));
         let angles = absolute_angles(state).map(f64::abs);
         Self {
-            rail: ends[0].max(ends[1]),
-            angle: angles.fold(0.0, f64::max) / f64::from(limits.angle_rad),
-            speed: speed.abs() / f64::from(limits.speed_m_per_s),
+            rail: most(low, high),
+            angle: share(angles.fold(0.0, f64::max), limits.angle_rad),
+            speed: share(speed.abs(), limits.speed_m_per_s),
         }
     }
 
     fn max(self, other: Self) -> Self {
         Self {
-            rail: self.rail.max(other.rail),
-            angle: self.angle.max(other.angle),
-            speed: self.speed.max(other.speed),
+            rail: most(self.rail, other.rail),
+            angle: most(self.angle, other.angle),
+            speed: most(self.speed, other.speed),
         }
     }
 }

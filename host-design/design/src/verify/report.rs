@@ -52,10 +52,11 @@ pub struct LawTrust {
 }
 
 impl TrustReport {
-    /// The requirements that are not met, with their laws.
+    /// The requirements that are not met, with their laws; and what their runs cannot decide.
     pub fn failed(&self) -> Vec<String> {
         let failed = self.checks.iter().filter(|check| !check.holds);
-        failed.map(|check| format!("{}: {}", check.law.key(), check.requirement)).collect()
+        let remark = |check: &Check| check.remark().map_or(String::new(), |remark| format!(" ({remark})"));
+        failed.map(|check| format!("{}: {}{}", check.law.key(), check.requirement, remark(check))).collect()
     }
 }
 
@@ -72,6 +73,9 @@ pub struct Check {
     pub found: Option<f64>,
     /// Whether it holds.
     pub holds: bool,
+    /// If the number of runs cannot decide whether it holds: the fewest runs that could show that it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fewest_runs: Option<usize>,
 }
 
 /// Makes the report.
@@ -200,6 +204,11 @@ impl Check {
         self.found.map_or(without_number.to_owned(), |found| significant(found, 3))
     }
 
+    /// What is missing for a verdict, if anything is.
+    pub fn remark(&self) -> Option<String> {
+        self.fewest_runs.map(|fewest| format!("too few runs: at least {fewest} are needed"))
+    }
+
     /// The threshold, as text.
     pub fn required_text(&self) -> String {
         significant(self.required, 3)
@@ -214,12 +223,19 @@ impl Check {
         unbounded: bool,
     ) -> Self {
         let holds = found.map_or(unbounded, |found| found >= required);
-        Check { law, requirement, required, found, holds }
+        Check { law, requirement, required, found, holds, fewest_runs: None }
     }
 
     /// A requirement that all of a number of runs survive.
     fn all_survive(law: Law, requirement: &'static str, runs: f64, survived: f64) -> Self {
-        Check { law, requirement, required: runs, found: Some(survived), holds: survived >= runs }
+        Check {
+            law,
+            requirement,
+            required: runs,
+            found: Some(survived),
+            holds: survived >= runs,
+            fewest_runs: None,
+        }
     }
 }
 
@@ -232,13 +248,14 @@ fn checks(rig: &Rig, trust: &LawTrust) -> Vec<Check> {
         required: 1.0,
         found: Some(trust.linear.spectral_radius),
         holds: trust.linear.stable,
+        fewest_runs: None,
     }];
     checks.extend(margins.into_iter().flat_map(|margins| margin_checks(&rig.verify, law, margins)));
     checks.extend(run_checks(&rig.verify, trust));
     checks.extend(margins.map(|margins| {
         let (required, peak) = (rig.verify.peak_sensitivity, margins.peak_sensitivity);
         let requirement = "peak sensitivity at most (peak_sensitivity)";
-        Check { law, requirement, required, found: Some(peak), holds: peak <= required }
+        Check { law, requirement, required, found: Some(peak), holds: peak <= required, fewest_runs: None }
     }));
     checks.extend(limit_check(rig, trust));
     checks.extend(counted_checks(trust));
@@ -274,7 +291,8 @@ fn run_checks(required: &Requirements, trust: &LawTrust) -> Vec<Check> {
     let random = trust.monte_carlo.as_ref().map(|runs| {
         let lowest = Some(100.0 * runs.interval[0]);
         let requirement = "random plants that survive in %, lower bound (success_percent)";
-        at_least(requirement, required.success_percent, lowest)
+        let fewest_runs = runs.fewest_to_decide(0.01 * required.success_percent);
+        Check { fewest_runs, ..at_least(requirement, required.success_percent, lowest) }
     });
     [tilt, encoder, random].into_iter().flatten().collect()
 }
@@ -282,9 +300,10 @@ fn run_checks(required: &Requirements, trust: &LawTrust) -> Vec<Check> {
 /// A loop that uses most of a limit at rest reaches it within hours.
 fn limit_check(rig: &Rig, trust: &LawTrust) -> Option<Check> {
     let ripple = trust.noise_run.as_ref()?.ripple.as_ref().filter(|_| rig.chain().is_some())?;
-    let (required, found) = (rig.verify.limit_percent, 100.0 * ripple.limit_share.largest());
+    let (required, found) = (rig.verify.limit_percent, 100.0 * ripple.limit_share.largest()?);
     let requirement = "share of a limit used at rest in %, at most (limit_percent)";
-    Some(Check { law: trust.linear.law, requirement, required, found: Some(found), holds: found <= required })
+    let (law, holds) = (trust.linear.law, found <= required);
+    Some(Check { law, requirement, required, found: Some(found), holds, fewest_runs: None })
 }
 
 /// Requirements that all of a number of runs survive.
@@ -302,7 +321,7 @@ fn counted_checks(trust: &LawTrust) -> Vec<Check> {
         Check::all_survive(law, requirement, noise.runs as f64, noise.survived as f64)
     });
     let imperfections = trust.imperfections.iter().map(|required| {
-        let (runs, within) = (required.runs as f64, required.verdict.stayed_on as f64);
+        let (runs, within) = (required.verdict.runs as f64, required.verdict.stayed_on as f64);
         Check::all_survive(law, required.requirement, runs, within)
     });
     corners.into_iter().chain(nominal).chain(tolerated).chain(imperfections).collect()

@@ -50,6 +50,12 @@ fn the_loop_states_how_slow_its_drive_may_be() {
     let resonance_hz = |rig: &Rig| StepMotor::of(rig).unwrap().resonance_hz(rig.chain().unwrap()).unwrap();
     assert!((200.0..230.0).contains(&resonance_hz(&rig)), "{}", resonance_hz(&rig));
     assert!(resonance_hz(&with_motor(10.0)) < limits.resonance_hz.unwrap());
+    // A motor that rings longer has to be faster.
+    let mut ringing = rig.clone();
+    ringing.reality.step_motor.motor_damping_percent = 3.0;
+    let of_ringing = DriveLimits::of(&ringing, &certified(&ringing).double).unwrap();
+    assert!(of_ringing.resonance_hz > limits.resonance_hz, "{of_ringing:?}");
+    assert_eq!(of_ringing.bandwidth_hz, limits.bandwidth_hz);
     // A force has no such limits.
     let force = crate::published::rig("quadruple-paper");
     assert_eq!(DriveLimits::of(&force, &certified(&force).double), None);

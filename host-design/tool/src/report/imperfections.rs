@@ -36,7 +36,7 @@ pub(super) struct SurvivalRow {
 
 impl SurvivalTable {
     pub(super) fn of(found: &Imperfections) -> Self {
-        let together = found.together.map(|all| all.text(found.settings.seeds));
+        let together = found.together.map(|all| all.text());
         Self {
             law: found.law.title(),
             rows: found.alone.iter().map(SurvivalRow::of).collect(),

@@ -24,7 +24,7 @@ pub(super) fn check_rows(report: &TrustReport) -> Vec<CheckRow> {
         holds: check.holds,
         law: check.law.title(),
         requirement: check.requirement,
-        found: check.found_text(),
+        found: [check.found_text()].into_iter().chain(check.remark()).collect::<Vec<_>>().join("; "),
         required: check.required_text(),
     };
     report.checks.iter().map(row).collect()

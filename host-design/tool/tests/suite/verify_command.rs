@@ -231,3 +231,37 @@ fn an_imperfection_that_the_file_requires_to_be_stood_is_a_requirement() {
     assert_eq!(required("1e-3"), (true, 4.0));
     assert_eq!(required("1.0"), (false, 4.0), "a driver that makes it fall");
 }
+
+#[test]
+fn too_few_runs_are_no_verdict_and_a_limit_that_is_not_there_has_no_share() {
+    let (_folder, path) = changed(SINGLE, &[("\nspeed_m_per_s", "\n#speed_m_per_s")]);
+    let arguments = |runs: &'static str| ["--runs", runs, "--law", "lqr"];
+    let output = verify(&path, &arguments("20"), None);
+    assert_eq!(status(&output), 1, "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let open: Vec<&str> = text.lines().filter(|line| line.trim_start().starts_with("open")).collect();
+    assert!(open.len() == 1 && open[0].contains("too few runs: at least 73 are needed"), "{text}");
+    assert!(!text.contains("FAILS") && stderr(&output).contains("at least 73"), "{text}");
+    let shares = text.lines().find(|line| line.contains("of the limits")).unwrap();
+    assert!(shares.contains("rail") && shares.contains("angle") && !shares.contains("speed"), "{shares}");
+    // Negative control: so many decide.
+    let output = verify(&path, &[&arguments("73")[..], &["--json"]].concat(), None);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let report = object(&output);
+    assert!(
+        report["checks"].as_array().unwrap().iter().all(|check| check["fewest_runs"].is_null()),
+        "{report}"
+    );
+    assert!(report["laws"][0]["noise_run"]["limit_share"]["speed"].is_null(), "{report}");
+}
+
+#[test]
+fn a_share_that_the_runs_cannot_show_ends_a_swing_up_before_it_begins() {
+    let (_folder, path) = changed(SINGLE, &[("[swing_up]", "[swing_up]\nsuccess_percent = 99")]);
+    let command = ["swing-up", path.to_str().unwrap(), "--no-write"];
+    let output = Command::new(env!("CARGO_BIN_EXE_upright")).args(command).output().unwrap();
+    assert_eq!(status(&output), 2, "{}", stderr(&output));
+    for words in ["200 random runs", "at least 381 are needed", "at most 98.1"] {
+        assert!(stderr(&output).contains(words), "{words}: {}", stderr(&output));
+    }
+}

@@ -15,13 +15,15 @@ use crate::table::TableValues;
 
 pub use catalogue::{IMPERFECTIONS, Imperfection};
 use cure::Cures;
-use search::SizeSearch;
 pub(super) use search::first;
+use search::{Setpoint, SizeSearch};
 
 pub use survival::{
     Cure, ImperfectionSettings, Imperfections, LeftOut, OfBristle, RequiredSurvival, SizeRuns, Survival,
 };
 
+/// The requirement of all imperfections of the rig file.
+const OF_REALITY: &str = "runs with the motor on, with all of [reality]";
 /// Sizes at which a limit cycle is shown, as shares of the one at which the loop falls.
 const SHARES: [f64; 7] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5, 0.7, 0.9];
 
@@ -48,7 +50,9 @@ pub fn imperfections(
     };
     let mut alone: Vec<Survival> = parallel::try_map(Imperfection::all_of(rig), one)?;
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
-    let together = (rig.reality != Reality::default()).then(|| search.verdict(rig)).transpose()?;
+    let together = (rig.reality != Reality::default())
+        .then(|| search.verdict(rig, Setpoint::RestsAndMoves))
+        .transpose()?;
     Ok(Imperfections { law, settings: *settings, alone, left_out: LeftOut::of(rig), together })
 }
 
@@ -67,7 +71,7 @@ pub fn survival(
     SizeSearch { rig, table, law, settings }.survival(imperfection, &[])
 }
 
-/// Runs `law` with one imperfection alone, of this size.
+/// Runs `law` with one imperfection alone, of this size, at rest.
 ///
 /// # Errors
 /// As [`imperfections()`].
@@ -80,10 +84,11 @@ pub fn of_size(
     size: f64,
 ) -> Result<SizeRuns, VerifyError> {
     chain(rig, "imperfections")?;
-    SizeSearch { rig, table, law, settings }.alone(imperfection, size)
+    SizeSearch { rig, table, law, settings }.alone(imperfection, size, Setpoint::Rests)
 }
 
-/// Runs `law` with the imperfections that it has to survive according to `[verify]`; empty if there are none.
+/// Runs `law` with the imperfections that it has to survive according to `[verify]`, and with the whole `[reality]` of
+/// the rig file, at rest and with a set-point that moves; empty if there are none.
 ///
 /// # Errors
 /// As [`imperfections()`].
@@ -100,10 +105,15 @@ pub fn required_imperfections(
     let required = |imperfection: &'static Imperfection| {
         let size = (imperfection.required)(&rig.verify)?;
         let Imperfection { key, requirement, .. } = *imperfection;
-        let survival = |verdict| RequiredSurvival { key, requirement, size, runs: settings.seeds, verdict };
-        Some(search.alone(imperfection, size).map(survival))
+        let survival = |verdict| RequiredSurvival { key, requirement, size: Some(size), verdict };
+        Some(search.alone(imperfection, size, Setpoint::RestsAndMoves).map(survival))
     };
-    IMPERFECTIONS.iter().filter_map(required).collect::<Result<_, VerifyError>>()
+    let of_reality = || {
+        let verdict = search.verdict(rig, Setpoint::RestsAndMoves)?;
+        Ok(RequiredSurvival { key: "reality", requirement: OF_REALITY, size: None, verdict })
+    };
+    let whole = (rig.reality != Reality::default()).then(of_reality);
+    IMPERFECTIONS.iter().filter_map(required).chain(whole).collect::<Result<_, VerifyError>>()
 }
 
 /// The limit cycle as a function of the size of an imperfection: sizes below the one at which the loop falls, or below
@@ -123,7 +133,7 @@ pub fn limit_cycle(
     let end = survival.falls_at.unwrap_or(survival.largest_tried);
     let at = |share: f64| {
         let size = share * end;
-        search.alone(survival.imperfection, size).map(|verdict| (size, verdict))
+        search.alone(survival.imperfection, size, Setpoint::Rests).map(|verdict| (size, verdict))
     };
     SHARES.into_iter().map(at).collect::<Result<_, VerifyError>>()
 }

@@ -22,13 +22,26 @@ const CURES: f64 = 1.2;
 
 /// What has to survive a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Judge {
-    /// The controller alone, at rest.
-    Controller,
-    /// The whole firmware, at rest.
-    Firmware,
-    /// The whole firmware, with a set-point that moves.
-    FirmwareMoving,
+struct Judge {
+    /// The whole firmware, or the controller alone.
+    is_firmware: bool,
+    /// With a set-point that moves, or at rest.
+    moves: bool,
+}
+
+impl Judge {
+    const CONTROLLER: Self = Self { is_firmware: false, moves: false };
+    const FIRMWARE: Self = Self { is_firmware: true, moves: false };
+    const FIRMWARE_MOVING: Self = Self { is_firmware: true, moves: true };
+}
+
+/// What the set-point does in the runs of a verdict.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Setpoint {
+    /// It stays where it is.
+    Rests,
+    /// It rests in the first runs, and moves in as many others.
+    RestsAndMoves,
 }
 
 pub(super) struct SizeSearch<'a> {
@@ -54,9 +67,9 @@ impl SizeSearch<'_> {
             };
             Ok((
                 bristle_rad,
-                first(Judge::Controller)?,
-                first(Judge::Firmware)?,
-                first(Judge::FirmwareMoving)?,
+                first(Judge::CONTROLLER)?,
+                first(Judge::FIRMWARE)?,
+                first(Judge::FIRMWARE_MOVING)?,
             ))
         });
         let of_bristles = of_bristles.collect::<Result<Vec<_>, VerifyError>>()?;
@@ -101,11 +114,11 @@ impl SizeSearch<'_> {
             let search = SizeSearch { table, ..*self };
             // Most changes help little: those are found with one size.
             let needed = best.as_ref().map_or(CURES * size, |best| best.turned_off_at);
-            if search.end(&imperfection.on_each(self.rig, needed), Judge::Firmware)?.is_some() {
+            if search.end(&imperfection.on_each(self.rig, needed), Judge::FIRMWARE)?.is_some() {
                 continue;
             }
             let found = self.first(imperfection, &|size| {
-                search.end(&imperfection.on_each(self.rig, size), Judge::Firmware)
+                search.end(&imperfection.on_each(self.rig, size), Judge::FIRMWARE)
             })?;
             let [_, largest] = self.range(imperfection);
             let turned_off_at = found.map_or(largest, |(size, _)| size);
@@ -158,14 +171,14 @@ impl SizeSearch<'_> {
     fn run(&self, real: &Rig, seed: u64, judge: Judge) -> Result<Outcome, VerifyError> {
         let ImperfectionSettings { duration_s, disturbance, .. } = self.settings;
         let scenario = Scenario {
-            is_supervised: judge != Judge::Controller,
+            is_supervised: judge.is_firmware,
             start: leaning(real, &vec![waking_lean(real); real.links()]),
             ..disturbed(real, self.law, *duration_s, disturbance, seed)
         };
-        let scenario = if judge == Judge::FirmwareMoving { moving(scenario, self.table) } else { scenario };
+        let scenario = if judge.moves { moving(scenario, self.table) } else { scenario };
         let horizon = Horizon::default();
         // A firmware without encoders cannot be started.
-        if judge == Judge::Controller || scenario.sensing != Sensing::Encoders {
+        if !judge.is_firmware || scenario.sensing != Sensing::Encoders {
             return Ok(trial(real, self.table, &scenario, &horizon)?);
         }
         Ok(trial_from_power_up(real, self.table, &scenario, &horizon)?)
@@ -173,31 +186,40 @@ impl SizeSearch<'_> {
 
     /// Runs of all seeds on a machine with this imperfection alone; of the machines of
     /// [`on_each`](Imperfection::on_each), the one on which the fewest survive.
-    pub(super) fn alone(&self, imperfection: &Imperfection, size: f64) -> Result<SizeRuns, VerifyError> {
+    pub(super) fn alone(
+        &self,
+        imperfection: &Imperfection,
+        size: f64,
+        setpoint: Setpoint,
+    ) -> Result<SizeRuns, VerifyError> {
         let machines = imperfection.on_each(self.rig, size);
-        let all = machines.iter().map(|real| self.verdict(real)).collect::<Result<Vec<_>, _>>()?;
+        let all = machines.iter().map(|real| self.verdict(real, setpoint)).collect::<Result<Vec<_>, _>>()?;
         let worst = all.into_iter().min_by_key(|runs| (runs.stayed_on, runs.survived));
-        worst.map_or_else(|| self.verdict(self.rig), Ok)
+        worst.map_or_else(|| self.verdict(self.rig, setpoint), Ok)
     }
 
     /// Runs of all seeds on this machine, by the whole firmware and, where it turns the motor off, by the controller
     /// alone.
-    pub(super) fn verdict(&self, real: &Rig) -> Result<SizeRuns, VerifyError> {
-        let one = |seed: u64| {
-            let by_firmware = self.run(real, seed, Judge::Firmware)?;
+    pub(super) fn verdict(&self, real: &Rig, setpoint: Setpoint) -> Result<SizeRuns, VerifyError> {
+        let one = |(seed, moves): (u64, bool)| {
+            let by_firmware = self.run(real, seed, Judge { is_firmware: true, moves })?;
             let alone = match by_firmware.fall {
-                Some(_) => self.run(real, seed, Judge::Controller)?,
+                Some(_) => self.run(real, seed, Judge { is_firmware: false, moves })?,
                 None => by_firmware.clone(),
             };
             Ok::<_, VerifyError>((by_firmware, alone))
         };
-        let all: Vec<_> = parallel::try_map(1..=self.settings.seeds, one)?;
+        let of_all = |moves: bool| (1..=self.settings.seeds).map(move |seed| (seed, moves));
+        let moved = of_all(true).filter(|_| setpoint == Setpoint::RestsAndMoves);
+        let runs: Vec<(u64, bool)> = of_all(false).chain(moved).collect();
+        let all: Vec<_> = parallel::try_map(&runs, |&run| one(run))?;
         let ended: Vec<FallKind> =
             all.iter().filter_map(|(by_firmware, _)| Some(by_firmware.fall.as_ref()?.kind)).collect();
         let largest = |of: fn(&Outcome) -> f64| all.iter().map(|(_, alone)| of(alone)).fold(0.0, f64::max);
         Ok(SizeRuns {
+            runs: runs.len() as u64,
             survived: all.iter().filter(|(_, alone)| alone.survives()).count() as u64,
-            stayed_on: self.settings.seeds - ended.len() as u64,
+            stayed_on: (runs.len() - ended.len()) as u64,
             ended_by: ended.first().copied(),
             peak_angle_rad: largest(|outcome| outcome.peak_angle_rad),
             peak_position_m: largest(|outcome| outcome.peak_error_m),

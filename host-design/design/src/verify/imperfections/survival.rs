@@ -32,6 +32,8 @@ impl ImperfectionSettings {
 /// Results of the runs with one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SizeRuns {
+    /// Number of runs.
+    pub runs: u64,
     /// Number of runs that the controller alone survives.
     pub survived: u64,
     /// Number of runs in which the whole firmware survives: neither its limits nor its fault detection turns the motor
@@ -155,7 +157,8 @@ pub struct Imperfections {
     /// Those that are not simulated on this machine.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
-    /// All imperfections of the rig file's `[reality]` together; none if it has none.
+    /// All imperfections of the rig file's `[reality]` together, at rest and with a set-point that moves; none if it has
+    /// none.
     pub together: Option<SizeRuns>,
 }
 
@@ -177,9 +180,9 @@ impl LeftOut {
 }
 
 impl SizeRuns {
-    /// How many of `runs` survive, as text: the controller alone, too, if the firmware turns the motor off in some.
-    pub fn text(&self, runs: u64) -> String {
-        let Self { survived, stayed_on, peak_angle_rad, peak_position_m, .. } = self;
+    /// How many survive, as text: the controller alone, too, if the firmware turns the motor off in some.
+    pub fn text(&self) -> String {
+        let Self { runs, survived, stayed_on, peak_angle_rad, peak_position_m, .. } = self;
         let off = self.ended_by.map_or(String::new(), |kind| format!(" ({kind})"));
         let alone =
             if survived == stayed_on { String::new() } else { format!("; the controller alone {survived}") };
@@ -189,17 +192,15 @@ impl SizeRuns {
     }
 }
 
-/// A size that the loop has to survive according to `[verify]`, and the results of its runs.
+/// A size that the loop has to survive according to `[verify]`, or the whole `[reality]`, and the results of its runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RequiredSurvival {
-    /// The key of the imperfection.
+    /// The key of the imperfection, or `reality`.
     pub key: &'static str,
     /// The requirement, with this key.
     pub requirement: &'static str,
-    /// The required size.
-    pub size: f64,
-    /// Number of runs with this size.
-    pub runs: u64,
-    /// Results of these runs.
+    /// The required size; none for `[reality]`.
+    pub size: Option<f64>,
+    /// Results of the runs with this size, at rest and with a set-point that moves.
     pub verdict: SizeRuns,
 }

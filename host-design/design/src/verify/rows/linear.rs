@@ -74,7 +74,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
         name: "least resonance",
         meaning: "frequency to which the resonance of a step motor with the cart may fall before the loop, which does not know \
-                  of it, is unstable; damping ratio 0.1",
+                  of it, is unstable; its damping is `motor_damping_percent` of `[reality]`",
         values: One(|_, law| Some(format!("{} Hz", number(law.linear.drive?.resonance_hz?)))),
     },
     TrustQuantity {
@@ -155,7 +155,7 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
                   hours",
         values: One(|rig, law| {
             let ripple = law.noise_run.as_ref()?.ripple.as_ref().filter(|_| is_chain(rig))?;
-            Some(limits(ripple.limit_share))
+            Some(limits(ripple.limit_share)).filter(|text| !text.is_empty())
         }),
     },
     TrustQuantity {
@@ -164,9 +164,10 @@ pub(super) const QUANTITIES: &[TrustQuantity] = &[
                   latency; largest share of each limit",
         values: One(|_, law| {
             let run = law.corner_noise.as_ref()?;
-            let shares =
-                run.ripple.as_ref().map_or(String::new(), |found| format!("; {}", limits(found.limit_share)));
-            Some(format!("{} of {} combinations survive{shares}", run.survived, run.runs))
+            let survive = format!("{} of {} combinations survive", run.survived, run.runs);
+            let shares = run.ripple.as_ref().map(|found| limits(found.limit_share));
+            let shares = shares.filter(|text| !text.is_empty());
+            Some([survive].into_iter().chain(shares).collect::<Vec<_>>().join("; "))
         }),
     },
     TrustQuantity {
@@ -202,7 +203,10 @@ fn milliseconds(seconds: Option<f64>, none: &str) -> String {
     seconds.map_or(none.to_owned(), |s| format!("{} ms", number(1e3 * s)))
 }
 
+/// The shares of the limits that there are; empty if there is none.
 fn limits(share: LimitShare) -> String {
-    let [rail, angle, speed] = [share.rail, share.angle, share.speed].map(|share| number(1e2 * share));
-    format!("rail {rail} %, angle {angle} %, speed {speed} %")
+    let all = [("rail", share.rail), ("angle", share.angle), ("speed", share.speed)];
+    let text =
+        |(name, share): (&str, Option<f64>)| share.map(|share| format!("{name} {} %", number(1e2 * share)));
+    all.into_iter().filter_map(text).collect::<Vec<_>>().join(", ")
 }

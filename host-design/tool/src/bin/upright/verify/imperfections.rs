@@ -32,7 +32,7 @@ fn write_table(out: &mut String, found: &Imperfections) -> core::fmt::Result {
     }
     match &found.together {
         None => writeln!(out, "  the rig file has no [reality]"),
-        Some(all) => writeln!(out, "  [reality] of the rig file: {}", all.text(found.settings.seeds)),
+        Some(all) => writeln!(out, "  [reality] of the rig file: {}", all.text()),
     }
 }
 
