@@ -46,6 +46,7 @@ mod imposed;
 mod log;
 mod machines;
 mod model;
+mod modes;
 mod normal;
 mod of_rig;
 mod old_values;
