@@ -32,6 +32,10 @@ pub enum Doubt {
         /// Its standard deviation.
         deviation: f64,
     },
+    /// Total mass, first and second moments are all about this many times those of the file.
+    Scale(f64),
+    /// The rail is not level (rad).
+    Tilted(f64),
     /// The model leaves far more of the measurements unexplained than the sensor would.
     Residual {
         /// The cart, or a joint from 1.
@@ -93,6 +97,18 @@ impl core::fmt::Display for Doubt {
                  pulley in the file. Lengths and moments are wrong until then.",
                 significant(*share, 4),
                 significant(*deviation, 2)
+            ),
+            Doubt::Scale(by) => write!(
+                f,
+                "Masses and moments are all about {} times those of the file: the force is rather {} times what is said. Check \
+                 supply_v, torque_constant_n_m_per_a, resistance_ohm, gear_ratio, the pulley, and the unit of the drive.",
+                significant(*by, 2),
+                significant(1.0 / by, 2)
+            ),
+            Doubt::Tilted(slope_rad) => write!(
+                f,
+                "The rail rises by {}°: level it, or the cart rolls off while the links balance.",
+                significant(slope_rad.to_degrees(), 2)
             ),
             Doubt::Residual { channel, allowed, times } => write!(
                 f,

@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::estimated::{Estimate, Identification};
 use super::free;
 use super::imposed;
+use super::late;
 use super::log::Log;
 use super::model::Model;
 use super::old_values::old_values;
@@ -22,8 +23,9 @@ use super::recordings::{Recorded, Recordings};
 use super::shooting::{Shooting, WINDOW_S};
 use super::travel;
 use super::verdict::{HeldOut, Predicted, Refusal, channels, judge, judge_windows};
+use super::whole;
 use super::window_errors::{WindowErrors, window_errors};
-use super::wiring;
+use super::wiring_search;
 use crate::parallel::{Progress, ProgressStep};
 use crate::rig::{Chain, Rig};
 
@@ -91,7 +93,7 @@ pub fn identify_recordings(
     progress: Progress<'_>,
 ) -> Result<Identification, IdentifyError> {
     let chain = chain_of(rig)?;
-    let Recorded { record, finer, lost_ticks, is_driven } = recordings.recorded(rig)?;
+    let Recorded { record, finer, lost_ticks, is_driven, rows } = recordings.recorded(rig)?;
     record.at_least(LEAST_S)?;
     record.moves()?;
     let mut model = record.model(chain.gravity_m_per_s2);
@@ -99,6 +101,7 @@ pub fn identify_recordings(
     let mut priors = priors(rig, chain, settings.eccentricity);
     let mut found = Identification {
         lost_ticks,
+        rows,
         is_driven,
         delay_ticks: rig.tick.delay_ticks,
         ..Identification::of_record(&record)
@@ -108,8 +111,9 @@ pub fn identify_recordings(
     } else if !is_driven {
         free::known(rig, model.layout, &mut priors, record.is_clamped);
     }
-    if is_driven && !settings.trust_wiring {
-        let wiring = wiring::find(&model, &record, &priors, progress);
+    if !settings.trust_wiring {
+        let in_tables = wiring_search::find_in_tables(rig, recordings, &model, &priors, progress)?;
+        let wiring = in_tables.unwrap_or_else(|| wiring_search::find(&model, &record, &priors, progress));
         found.wiring = Some(wiring.clone());
         if !wiring.is_as_in_file() {
             found.refusal = Some(Refusal::Wiring(wiring));
@@ -117,13 +121,7 @@ pub fn identify_recordings(
         }
     }
     let p = if is_driven {
-        let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
-        let used_s = record.seconds() - held_s;
-        let finer = finer.map(|finer| finer.part(0.0, used_s));
-        let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
-        let fitted = Fitted { rig, priors: &priors, used: &used, held: &held, finer: finer.as_ref() };
-        fitted.run(&model, &mut found, progress)?;
-        fitted.full(&found)
+        driven(rig, &model, (record, finer), &priors, &mut found, progress)?
     } else {
         progress(ProgressStep::Begin("free swings", free::FITS));
         let left_out = |kind| settings.leaves_out(kind);
@@ -136,6 +134,42 @@ pub fn identify_recordings(
     }
     decide(chain, settings, &p, &mut found);
     Ok(found)
+}
+
+/// Identifies a machine with a drive, and returns all parameters; if the drive acts several ticks late, that is found
+/// first.
+fn driven(
+    rig: &Rig,
+    model: &Model,
+    (mut record, mut finer): (Record, Option<Record>),
+    priors: &[Prior],
+    found: &mut Identification,
+    progress: Progress<'_>,
+) -> Result<Vec<f64>, IdentifyError> {
+    let mut shifts = 0;
+    loop {
+        let held_s = HELD_OUT.0.min(HELD_OUT.1 * record.seconds());
+        let used_s = record.seconds() - held_s;
+        let finer_used = finer.as_ref().map(|finer| finer.part(0.0, used_s));
+        let (used, held) = (record.part(0.0, used_s), record.part(used_s, used_s + held_s + 1.0));
+        let fitted = Fitted { rig, priors, used: &used, held: &held, finer: finer_used.as_ref() };
+        progress(ProgressStep::Begin("multiple shooting", 1));
+        let shot = fitted.shoot(model);
+        let ticks = if record.is_moved { 0 } else { late::ticks(model.layout, &shot) };
+        if ticks == 0 || shifts == late::MOST_SHIFTS {
+            fitted.run(model, &shot, found, progress)?;
+            let p = fitted.full(found);
+            if !record.is_moved {
+                found.doubts.extend(whole::doubts(&found.estimates));
+            }
+            found.add_to_delay();
+            return Ok(p);
+        }
+        shifts += 1;
+        found.late_ticks += ticks;
+        record = record.shifted(ticks);
+        finer = finer.map(|finer| finer.shifted(ticks));
+    }
 }
 
 /// The numbers for the rig file, and whether they may be written.
@@ -200,23 +234,28 @@ impl Fitted<'_> {
         kinds.into_iter().zip(self.priors).map(of).collect()
     }
 
-    /// Multiple shooting, prediction-error fit, deviations, and the comparison on the held-out part.
+    /// The parameters by multiple shooting.
+    fn shoot(&self, model: &Model) -> Vec<f64> {
+        let start: Vec<f64> = self.priors.iter().map(|prior| prior.value).collect();
+        let first = self.used.part(0.0, SHOOTING_S);
+        let shooting = Shooting { model, record: &first, priors: self.priors, free: true };
+        shooting.fit(&start, WINDOW_S, ITERATIONS.0, ITERATIONS.1).p
+    }
+
+    /// Prediction-error fit from the parameters `shot`, deviations, and the comparison on the held-out part.
     fn run(
         &self,
         model: &Model,
+        shot: &[f64],
         found: &mut Identification,
         progress: Progress<'_>,
     ) -> Result<(), IdentifyError> {
         let start: Vec<f64> = self.priors.iter().map(|prior| prior.value).collect();
-        progress(ProgressStep::Begin("multiple shooting", 1));
-        let first = self.used.part(0.0, SHOOTING_S);
-        let shooting = Shooting { model, record: &first, priors: self.priors, free: true };
-        let shot = shooting.fit(&start, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
         progress(ProgressStep::Begin("prediction error", 1));
         let filter = Filter { model, record: self.used, priors: self.priors };
-        let noise = filter.tuned(&shot.p);
+        let noise = filter.tuned(shot);
         let undetermined = || IdentifyError::Undetermined("the equations have no solution");
-        let (p, _) = filter.fit(&shot.p, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
+        let (p, _) = filter.fit(shot, &noise, ITERATIONS.2).ok_or_else(undetermined)?;
         // Noise and smoothing were tuned for the parameters before this fit.
         let (model, p) = with_friction_laws(&filter, p, &noise);
         found.doubts.extend(Doubt::of_friction(&model));

@@ -4,6 +4,7 @@ use super::doubt::Doubt;
 use super::parameters::ParameterKind;
 use super::realise::Realised;
 use super::record::Record;
+use super::recordings::RowTimes;
 use super::verdict::{ChannelFit, Refusal};
 use super::window_errors::WindowErrors;
 use super::wiring::WiringFound;
@@ -25,6 +26,29 @@ pub struct Estimate {
     pub held_by_prior: bool,
 }
 
+impl Estimate {
+    /// Whether a machine can have this value: a number, and no negative mass, length or friction.
+    pub fn is_possible(&self) -> bool {
+        let is_number = self.new.is_finite() && self.deviation.is_finite();
+        let signs = match self.kind {
+            ParameterKind::TotalMass
+            | ParameterKind::FirstMoment(_)
+            | ParameterKind::Length(_)
+            | ParameterKind::SecondMoment(_)
+            | ParameterKind::Presliding(_)
+            | ParameterKind::Travel => self.new > 0.0,
+            ParameterKind::CartViscous
+            | ParameterKind::JointViscous(_)
+            | ParameterKind::CartDry
+            | ParameterKind::JointDry(_)
+            | ParameterKind::AirDrag(_)
+            | ParameterKind::DeadZone => self.new >= 0.0,
+            _ => true,
+        };
+        is_number && signs
+    }
+}
+
 /// Result of an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
@@ -32,6 +56,8 @@ pub struct Identification {
     pub seconds: f64,
     /// Number of ticks that are missing in the logs.
     pub lost_ticks: u64,
+    /// The times of the rows, of tables.
+    pub rows: Option<RowTimes>,
     /// Largest angle of a link from hanging (rad).
     pub largest_angle_rad: f64,
     /// Result of the wiring check; none if the wiring was taken on trust.
@@ -55,6 +81,9 @@ pub struct Identification {
     pub predicted: Vec<WindowErrors>,
     /// The numbers for the rig file; none if the wiring is wrong or the numbers are not physical.
     pub realised: Option<Realised>,
+    /// Whole ticks, or rows of a table, by which the drive was shifted, because it acts that much later than the file
+    /// says; the estimate of the delay includes them.
+    pub late_ticks: i64,
     /// Delay that the rig file states (ticks).
     pub delay_ticks: u8,
     /// What casts doubt on the numbers.
@@ -69,6 +98,7 @@ impl Identification {
         Self {
             seconds: record.seconds(),
             lost_ticks: 0,
+            rows: None,
             largest_angle_rad: record.largest_angle(),
             wiring: None,
             estimates: Vec::new(),
@@ -80,10 +110,18 @@ impl Identification {
             left_out: Vec::new(),
             predicted: Vec::new(),
             realised: None,
+            late_ticks: 0,
             delay_ticks: 0,
             doubts: Vec::new(),
             refusal: None,
         }
+    }
+
+    /// Adds the ticks by which the drive was shifted to the estimate of the delay.
+    pub(super) fn add_to_delay(&mut self) {
+        let late = self.late_ticks as f64;
+        let delays = self.estimates.iter_mut().filter(|estimate| estimate.kind == ParameterKind::Delay);
+        delays.for_each(|delay| delay.new += late);
     }
 
     /// The estimate of a parameter, if it was identified.

@@ -8,18 +8,18 @@ use upright::control::actuator::Drive;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::shaking::SPEED_SHARE;
 use upright::supervision::slow_drive::SlowDrive;
-use upright::table::{Equilibrium, Law, StepMap};
+use upright::table::{Law, StepMap};
 
 use super::cart_force::CartForce;
 use super::channel::chain_of;
 use super::error::IdentifyError;
 use super::log::{DriveScale, Log, LogHeader, Tick};
 use super::model::Model;
+use super::modes::hanging_modes;
 use super::parameters::{Layout, priors};
 use super::record::Record;
 use super::step::Step;
-use crate::numerics::{Complex, eigenvalues};
-use crate::plant::{ChainParameters, linearise};
+use crate::plant::ChainParameters;
 use crate::reality::hanging_by_hand;
 use crate::rig::{Chain, Rig};
 use crate::simulate::{Bench, Scenario};
@@ -182,24 +182,6 @@ fn speed_limit(rig: &Rig) -> Option<f64> {
     let drive = rig.actuator.acceleration.as_ref()?;
     let both = drive.largest_speed_m_per_s(rig.tick.period_s).into_iter().chain(rig.limits.speed_m_per_s);
     both.reduce(f64::min)
-}
-
-/// The lowest and the highest frequency of the hanging links (Hz).
-fn hanging_modes(chain: &Chain) -> Result<[f64; 2], IdentifyError> {
-    let failed = || IdentifyError::Undetermined("the hanging links have no modes");
-    let mut chain = chain.clone();
-    chain.cart.friction_n_s_per_m = 0.0;
-    chain.links.iter_mut().for_each(|link| link.friction_n_m_s_per_rad = 0.0);
-    let linear =
-        linearise(&ChainParameters::<f64>::of(&chain), Equilibrium::HANGING).map_err(|_| failed())?;
-    let values = eigenvalues(&linear.a).map_err(|_| failed())?;
-    let frequencies = values.iter().map(|Complex { im, .. }: &Complex<f64>| im.abs() / TAU);
-    let all: Vec<f64> = frequencies.collect();
-    let highest = all.iter().copied().fold(0.0, f64::max);
-    // The free cart has the frequency 0, up to rounding.
-    let modes = all.iter().copied().filter(|&frequency| frequency > 1e-3 * highest);
-    let lowest = modes.fold(f64::INFINITY, f64::min);
-    if highest > 0.0 { Ok([lowest, highest]) } else { Err(failed()) }
 }
 
 /// The log of the simulated machine of `rig`, with its `[reality]`, shaken for `duration_s`.

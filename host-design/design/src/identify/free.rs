@@ -271,7 +271,8 @@ mod tests {
         let mut step = Step::new(&model, false);
         let mut state = vec![0.0, 1.4, 2.6, 0.0, 0.0, 0.0, 0.0];
         let counts: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
-        let mut rows = RecordingRows { period_s: 0.002, y: Vec::new(), drive: vec![None; 12_000] };
+        let mut rows =
+            RecordingRows { period_s: 0.002, drive: vec![None; 12_000], ..RecordingRows::default() };
         for _ in 0..rows.drive.len() {
             rows.y.extend((0..3).map(|channel| {
                 let value = model.measure(&p, &state, channel).value;

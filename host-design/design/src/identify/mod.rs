@@ -43,9 +43,11 @@ mod excite;
 mod feed;
 mod free;
 mod imposed;
+mod late;
 mod log;
 mod machines;
 mod model;
+mod modes;
 mod normal;
 mod of_rig;
 mod old_values;
@@ -56,6 +58,7 @@ mod realise;
 mod record;
 mod recorder;
 mod recordings;
+mod rerecorded;
 mod rows;
 mod shooting;
 mod step;
@@ -63,8 +66,10 @@ mod stribeck;
 mod table;
 mod travel;
 mod verdict;
+mod whole;
 mod window_errors;
 mod wiring;
+mod wiring_search;
 mod with_firmware;
 
 pub use coverage::{
@@ -82,8 +87,10 @@ pub use over_line::{LineError, OverLine};
 pub use parameters::ParameterKind;
 pub use realise::{Realised, RealisedCart, RealisedLink};
 pub use recorder::Recorder;
-pub use recordings::Recordings;
-pub use table::{AngleReference, AngleZero, Reading, RecordingError, RecordingTable};
+pub use recordings::{Recordings, RowTimes};
+pub use table::{
+    AngleReference, AngleZero, Misreading, Reading, RecordingError, RecordingTable, SaidOfTable,
+};
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use window_errors::{ChannelError, WindowErrors};
 pub use wiring::{Wiring, WiringFault, WiringFound};

@@ -18,8 +18,11 @@ use super::table::RecordingRows;
 use crate::design::{lag_s, shares_of_lag};
 use crate::rig::{Motor, Rig};
 
-/// Longest time from one sample to the next (s), which is also the integration step.
+/// Longest time from one sample to the next (s), unless a recording has fewer; of an imposed motion, also the longest
+/// integration step.
 const LONGEST_S: f64 = 0.0021;
+/// Longest integration step (s) with a force.
+const LONGEST_STEP_S: f64 = 0.0101;
 /// Shortest piece without a lost tick that is used (s).
 const SHORTEST_PIECE_S: f64 = 1.0;
 
@@ -162,6 +165,11 @@ impl Record {
         }
     }
 
+    /// Time from one tick, or row, to the next (s).
+    pub(super) fn period_s(&self) -> f64 {
+        self.dt_s / self.stride as f64
+    }
+
     /// Number of samples of a piece.
     pub(super) fn samples(&self, piece: usize) -> usize {
         self.pieces[piece].y.len() / self.channels
@@ -198,35 +206,9 @@ impl Record {
         part
     }
 
-    /// A copy with `change` applied to each row of measurements, and to the path of a cart whose motion is imposed.
-    pub(super) fn rewired(&self, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
-        let mut record = self.clone();
-        let mut row = vec![0.0; self.channels];
-        for piece in &mut record.pieces {
-            piece.y = piece.y.chunks(self.channels).flat_map(&change).collect();
-            for position in piece.drive.iter_mut().flatten().filter(|_| self.is_moved) {
-                row[0] = *position;
-                *position = change(&row)[0];
-            }
-        }
-        record
-    }
-
     /// The first channel whose measurements the model has to explain: not the cart's, if its motion is known.
     pub(super) fn first_channel(&self) -> usize {
         usize::from(self.is_clamped || self.is_moved)
-    }
-
-    /// A copy with the motor reversed.
-    pub(super) fn reversed(&self) -> Self {
-        let mut record = self.clone();
-        record
-            .pieces
-            .iter_mut()
-            .flat_map(|piece| &mut piece.drive)
-            .flatten()
-            .for_each(|drive| *drive = -*drive);
-        record
     }
 
     /// Force of each interval between two samples of a piece, with the delay and the dead zone of `p`:
@@ -385,7 +367,7 @@ impl Record {
             half_at: super::stribeck::HALF_AT,
             is_imposed: self.is_clamped || self.is_moved,
             // Pulses may come in slow ticks, which are smooth steps only for a force.
-            substeps: if self.is_moved { (self.dt_s / LONGEST_S).ceil() as usize } else { 1 },
+            substeps: (self.dt_s / if self.is_moved { LONGEST_S } else { LONGEST_STEP_S }).ceil() as usize,
             has_bristles: false,
         }
     }

@@ -64,9 +64,12 @@ impl core::fmt::Display for Refusal {
             Refusal::Wiring(found) => {
                 write!(
                     f,
-                    "{} (residuals {:.1} times smaller than as wired, {:.1} times smaller than with any other fault); then \
-                     record again",
-                    found.best, found.file_is_worse_by, found.margin
+                    "{} (residuals {:.1} times smaller than as {}, {:.1} times smaller than with any other fault){}",
+                    found.best,
+                    found.file_is_worse_by,
+                    if found.best.said.is_some() { "described" } else { "wired" },
+                    found.margin,
+                    if found.best.said.is_some() { "" } else { "; then record again" },
                 )?;
                 if found.is_ambiguous() {
                     write!(f, "; it may also be this: {}", found.second)?;
@@ -78,6 +81,11 @@ impl core::fmt::Display for Refusal {
     }
 }
 
+/// A number with so many decimals; a fit that diverges has none.
+fn number(value: f64, decimals: usize) -> String {
+    if value.is_finite() { format!("{value:.decimals$}") } else { "countless".to_owned() }
+}
+
 /// Checks that the fit of every channel is good enough.
 pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
     for fit in channels {
@@ -87,17 +95,18 @@ pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
             [fit.innovation_variance <= MOST_VARIANCE, share <= MOST_ERROR].map(|fits| !fits);
         if varies {
             return Err(Refusal::Misfit(format!(
-                "{} does not fit: the variance of its innovations is {:.2} times what is expected, at most {MOST_VARIANCE} is \
+                "{} does not fit: the variance of its innovations is {} times what is expected, at most {MOST_VARIANCE} is \
                  accepted; look for play, a loose encoder or a link that touches something, or record a longer log",
-                fit.name, fit.innovation_variance
+                fit.name,
+                number(fit.innovation_variance, 2)
             )));
         }
         if errs {
             return Err(Refusal::Misfit(format!(
-                "{} does not fit: predictions over 0.5 s are off by {:.1} % of its motion, at most {:.0} % are accepted; is \
+                "{} does not fit: predictions over 0.5 s are off by {} % of its motion, at most {:.0} % are accepted; is \
                  this the log of this machine, and does nothing touch the links?",
                 fit.name,
-                100.0 * share,
+                number(100.0 * share, 1),
                 100.0 * MOST_ERROR
             )));
         }
@@ -115,10 +124,13 @@ pub(super) fn judge_windows(left_out: &[WindowErrors]) -> Result<(), Refusal> {
             let fits = percent <= 100.0 * most;
             if !fits {
                 return Err(Refusal::Misfit(format!(
-                    "{} does not fit: predictions over {} s are off by {percent:.2} % of its motion, at most {:.2} % are accepted; \
-                     is this the recording of this machine, and are --angles, --zero, --reversed and the counts right?",
+                    "{} does not fit: predictions over {} s are off by {} % of its motion, at most {:.2} % are accepted; \
+                     is \
+                     this the recording of this machine, with the right --angles, --zero, --reversed and counts? Or was a motor \
+                     on, whose column is missing, or is it a hand or a stop that touches a link?",
                     channel.name,
                     windows.window_s,
+                    number(percent, 2),
                     100.0 * most
                 )));
             }

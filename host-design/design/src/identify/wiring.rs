@@ -1,35 +1,12 @@
 //! Signs, swapped encoders, counts per turn and the sign of the motor: which wiring explains the log best.
 
 use super::channel::channel_name;
-use super::model::Model;
-use super::parameters::Prior;
 use super::record::Record;
-use super::shooting::{Shooting, WINDOW_S};
+use super::table::{FACTORS, Misreading, SaidOfTable};
 use crate::number::significant;
-use crate::parallel::{self, Progress, ProgressStep};
 
-/// Begin and end of the part of the log that is used (s).
-const TIME_S: [f64; 2] = [0.5, 5.0];
-/// Iterations for each wiring, and then for so many of the best ones.
-const FIRST_ITERATIONS: usize = 1;
-const ITERATIONS: usize = 4;
-const FINALISTS: usize = 8;
-/// Rounds of iterations for the wiring of the file, each with new weights of the channels; the others have one. It is
-/// not accused because its fit is slow.
-const ROUNDS_OF_FILE: usize = 3;
-/// Wrong counts per turn that are tried.
-const FACTORS: [f64; 6] = [0.25, 1.0 / 3.0, 0.5, 2.0, 3.0, 4.0];
 /// A wiring other than that of the file is believed when the residuals are smaller by this factor.
 const MARGIN: f64 = 2.0;
-
-/// Residuals below this share of a step of the encoder are no better.
-const LEAST_RMS: f64 = 0.2;
-/// A wiring explains the log if its residuals are less than so many times the least.
-const EXPLAINED: f64 = 3.0;
-/// If the best one, other than that of the file, does not explain it, a fault is added to so many of the best ones, so
-/// often.
-const BEAM: usize = 4;
-const ROUNDS: usize = 2;
 
 /// A fault of the wiring. Channels are cart (0) and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +23,8 @@ pub enum WiringFault {
     DriveReversed,
     /// Such a drive moves the cart by this many times the travel per pulse that the file states.
     Step(f64),
+    /// A table was described wrongly.
+    Misread(Misreading),
 }
 
 /// A wiring: its faults, none if it is that of the file.
@@ -61,6 +40,8 @@ pub struct Wiring {
     pub channels: usize,
     /// Whether the drive imposes the cart's motion.
     pub is_moved: bool,
+    /// What a table was said to be; none of a log.
+    pub said: Option<SaidOfTable>,
 }
 
 /// Result of the wiring check.
@@ -111,6 +92,9 @@ impl core::fmt::Display for WiringFault {
                 "a pulse moves the cart by {} times step_m: correct step_m in the file, or the driver's microsteps",
                 significant(factor, 3)
             ),
+            WiringFault::Misread(misreading) => {
+                write!(f, "the table is not as it was described: {misreading:?}")
+            }
             WiringFault::Counts(channel, factor) => write!(
                 f,
                 "the encoder of {} gives {} times the counts of the file: correct its resolution in the file",
@@ -126,9 +110,16 @@ impl core::fmt::Display for Wiring {
         if self.faults.is_empty() {
             return f.write_str("as in the file");
         }
-        let faults: Vec<String> = self.faults.iter().map(ToString::to_string).collect();
+        let text = |fault: &WiringFault| match (fault, &self.said) {
+            (WiringFault::Misread(misreading), Some(said)) => said.explain(*misreading),
+            _ => fault.to_string(),
+        };
+        let faults: Vec<String> = self.faults.iter().map(text).collect();
         f.write_str(&faults.join("; "))?;
         let reversed = self.reversed();
+        if let (Some(said), false) = (&self.said, reversed.is_empty()) {
+            return write!(f, " (or else reverse all others: {})", said.names_without(&reversed).join(", "));
+        }
         if reversed.len() > 1 || (self.is_moved && 2 * reversed.len() == self.channels) {
             let name = |channel: usize| match channel {
                 0 if self.is_moved => "the drive".to_owned(),
@@ -146,13 +137,24 @@ impl core::fmt::Display for Wiring {
 impl Wiring {
     fn with(&self, fault: WiringFault) -> Self {
         let faults = self.faults.iter().copied().chain([fault]).collect();
-        Self { faults, ..*self }
+        Self { faults, ..self.clone() }
+    }
+
+    /// How a table was misread.
+    pub(super) fn misread(&self) -> Vec<Misreading> {
+        let of = |fault: &WiringFault| match *fault {
+            WiringFault::Misread(misreading) => Some(misreading),
+            _ => None,
+        };
+        self.faults.iter().filter_map(of).collect()
     }
 
     /// The channels whose encoders are reversed.
     fn reversed(&self) -> Vec<usize> {
         let channel = |fault: &WiringFault| match *fault {
-            WiringFault::Reversed(channel) => Some(channel),
+            WiringFault::Reversed(channel) | WiringFault::Misread(Misreading::Reversed(channel)) => {
+                Some(channel)
+            }
             WiringFault::DriveReversed => Some(0),
             _ => None,
         };
@@ -160,8 +162,10 @@ impl Wiring {
     }
 
     /// The record as it would have been with the wiring of the file, if it was recorded with this one.
-    fn undone(&self, record: &Record) -> Record {
+    pub(super) fn undone(&self, record: &Record) -> Record {
         self.faults.iter().rev().fold(record.clone(), |record, &fault| match fault {
+            // Undone where the table is read.
+            WiringFault::Misread(_) => record,
             WiringFault::MotorReversed => record.reversed(),
             WiringFault::Reversed(channel) => record.rewired(|row| scaled(row, channel, -1.0)),
             WiringFault::DriveReversed => record.rewired(|row| scaled(row, 0, -1.0)),
@@ -187,7 +191,7 @@ impl Wiring {
                 true => vec![WiringFault::MotorReversed],
                 false => reversed.map(fault).collect(),
             };
-            Self { faults, channels, is_moved }
+            Self { faults, channels, is_moved, said: None }
         };
         // Of a set and all others, the smaller one; of two that are equally large, that with the drive.
         let is_smaller = |set: &usize| {
@@ -198,7 +202,12 @@ impl Wiring {
     }
 
     /// This wiring with one more fault that is no sign: another pair, or an encoder whose counts are not yet wrong.
-    fn with_another(&self) -> Vec<Self> {
+    pub(super) fn with_another(&self) -> Vec<Self> {
+        if let Some(said) = &self.said {
+            let is_new = |misreading: &Misreading| !self.misread().contains(misreading);
+            let others = said.others().into_iter().filter(is_new);
+            return others.map(|misreading| self.with(WiringFault::Misread(misreading))).collect();
+        }
         let pairs = (1..self.channels)
             .flat_map(|one| (one + 1..self.channels).map(move |other| WiringFault::Swapped(one, other)));
         let fault = |channel: usize, factor: f64| match channel {
@@ -217,8 +226,10 @@ impl Wiring {
     }
 
     /// Whether both have the same faults and undo them in the same way: the order matters only for exchanged encoders.
-    fn is_same(&self, other: &Self) -> bool {
-        let exchanges = self.faults.iter().any(|fault| matches!(fault, WiringFault::Swapped(..)));
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let exchanges = self.faults.iter().any(|fault| {
+            matches!(fault, WiringFault::Swapped(..) | WiringFault::Misread(Misreading::Exchanged(..)))
+        });
         let same_set = self.faults.len() == other.faults.len()
             && self.faults.iter().all(|fault| other.faults.contains(fault));
         if exchanges { self.faults == other.faults } else { same_set }
@@ -231,73 +242,17 @@ fn scaled(row: &[f64], channel: usize, factor: f64) -> Vec<f64> {
     row
 }
 
-/// The wiring of the file, and the others that are tried first.
-fn wirings(channels: usize, is_moved: bool) -> (Wiring, Vec<Wiring>) {
-    let file = Wiring { faults: Vec::new(), channels, is_moved };
-    let others = Wiring::signs(channels, is_moved).into_iter().skip(1).chain(file.with_another()).collect();
+/// The wiring of the file, or a table as it was `said` to be, and the others that are tried first.
+pub(super) fn wirings(channels: usize, is_moved: bool, said: Option<SaidOfTable>) -> (Wiring, Vec<Wiring>) {
+    let file = Wiring { faults: Vec::new(), channels, is_moved, said };
+    let misread = |set: Vec<Misreading>| Wiring {
+        faults: set.into_iter().map(WiringFault::Misread).collect(),
+        ..file.clone()
+    };
+    let signs = match &file.said {
+        Some(said) => said.senses().into_iter().map(misread).collect(),
+        None => Wiring::signs(channels, is_moved).split_off(1),
+    };
+    let others = signs.into_iter().chain(file.with_another()).collect();
     (file, others)
-}
-
-/// Fits a few iterations with each wiring.
-pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: Progress<'_>) -> WiringFound {
-    let short = record.part(TIME_S[0], TIME_S[1]);
-    let short = if short.pieces.is_empty() { record.clone() } else { short };
-    let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();
-    let score = |wiring: &Wiring, iterations: usize, rounds: usize| {
-        let record = wiring.undone(&short);
-        let shooting = Shooting { model, record: &record, priors, free: true };
-        let fit = shooting.fit_settled(&start, WINDOW_S, iterations, rounds);
-        // Relative to the motion: a factor on the counts must not make residuals small. With `max` alone, a fit that
-        // has diverged would be the best.
-        let of = |(channel, &rms): (usize, &f64)| match rms.is_finite() {
-            true => libm::log(rms.max(LEAST_RMS * record.steps[channel]) / record.extent(channel)[1]),
-            false => f64::INFINITY,
-        };
-        let first = record.first_channel();
-        let score =
-            fit.rms.iter().enumerate().skip(first).map(of).sum::<f64>() / (record.channels - first) as f64;
-        progress(ProgressStep::Done);
-        (score, wiring.clone())
-    };
-    let sort = |scores: &mut Vec<(f64, Wiring)>| scores.sort_by(|one, other| one.0.total_cmp(&other.0));
-    // All of them with few iterations, then the best ones with all.
-    let judge = |wirings: &[Wiring]| {
-        let mut scores = parallel::map(wirings, |wiring| score(wiring, FIRST_ITERATIONS, 1));
-        sort(&mut scores);
-        scores.truncate(FINALISTS);
-        parallel::map(&scores, |(_, wiring)| score(wiring, ITERATIONS, 1))
-    };
-    let (file, others) = wirings(record.channels, record.is_moved);
-    progress(ProgressStep::Begin("wiring", (1 + others.len() + FINALISTS) as u64));
-    let (of_file, file) = score(&file, ITERATIONS, ROUNDS_OF_FILE);
-    let mut scores = judge(&others);
-    scores.push((of_file, file));
-    sort(&mut scores);
-    for _ in 0..ROUNDS {
-        if scores[0].1.faults.is_empty() || scores[0].0 < libm::log(EXPLAINED) + least(&short) {
-            break;
-        }
-        let mut more: Vec<Wiring> = Vec::new();
-        for wiring in scores.iter().take(BEAM).flat_map(|(_, wiring)| wiring.with_another()) {
-            if !more.iter().any(|other| other.is_same(&wiring)) {
-                more.push(wiring);
-            }
-        }
-        progress(ProgressStep::Begin("more faults of the wiring", (more.len() + FINALISTS) as u64));
-        scores.extend(judge(&more));
-        sort(&mut scores);
-    }
-    WiringFound {
-        best: scores[0].1.clone(),
-        second: scores[1].1.clone(),
-        margin: libm::exp(scores[1].0 - scores[0].0),
-        file_is_worse_by: libm::exp(of_file - scores[0].0),
-    }
-}
-
-/// The score of the least residuals.
-fn least(record: &Record) -> f64 {
-    let of = |channel: usize| libm::log(LEAST_RMS * record.steps[channel] / record.extent(channel)[1]);
-    let first = record.first_channel();
-    (first..record.channels).map(of).sum::<f64>() / (record.channels - first) as f64
 }

@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use super::text::{notes, row_texts, window_rows, windows};
+use super::text::{DIVERGES, notes, row_texts, variance_text, window_rows, windows};
 use crate::figure::{Axis, COLOURS_CSS, Curve, Figure, Panel, style_sheet};
 use crate::policy;
 use crate::report::{Plot, ReportError};
@@ -58,7 +58,7 @@ pub fn page(
         command,
         seconds: significant(found.seconds, 3),
         refusal: found.refusal.as_ref().map(ToString::to_string),
-        estimates: found.estimates.iter().map(row_texts).collect(),
+        estimates: found.estimates.iter().map(|estimate| row_texts(found, estimate)).collect(),
         fits: found.channels.iter().enumerate().map(fit_texts).collect(),
         windows: windows(found)
             .into_iter()
@@ -87,9 +87,12 @@ pub fn page(
 /// Name, variance of the innovations, and errors over 0.5 s.
 fn fit_texts((index, fit): (usize, &ChannelFit)) -> [String; 4] {
     let (factor, unit) = unit_of(index);
-    let error = |error: f64| format!("{} {unit}", significant(factor * error, 3));
+    let error = |error: f64| match error.is_finite() {
+        true => format!("{} {unit}", significant(factor * error, 3)),
+        false => DIVERGES.to_owned(),
+    };
     let [file, found] = fit.held_out.map(error);
-    [fit.name.clone(), format!("{:.2}", fit.innovation_variance), file, found]
+    [fit.name.clone(), variance_text(fit), file, found]
 }
 
 /// Factor from the SI unit of a channel to the unit in which it is drawn, and the name of that unit.

@@ -101,6 +101,8 @@ mod tests {
     const NOTHING: Identification = Identification {
         seconds: 60.0,
         lost_ticks: 0,
+        rows: None,
+        late_ticks: 0,
         largest_angle_rad: 0.3,
         wiring: None,
         estimates: Vec::new(),

@@ -4,21 +4,26 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use upright_design::identify::{
-    ChannelError, Estimate, Identification, ParameterKind, Settings, WindowErrors,
+    ChannelError, ChannelFit, Estimate, Identification, ParameterKind, Settings, WindowErrors,
 };
 use upright_design::number::significant;
 
 /// Below this angle the scale of the force is poorly known (rad).
 const LARGE_ENOUGH_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+/// Stands for the error of a prediction that has no number.
+pub(super) const DIVERGES: &str = "diverges";
+/// Factor on the deviations from which fewer rows are worth a note.
+const DEAR: f64 = 1.2;
 /// Share by which lengths and moments may be wrong without a model of the encoders' eccentricity.
 const WITHOUT_ECCENTRICITY: f64 = 0.003;
 
 /// The identification as text.
 pub fn text(rig: &str, found: &Identification, settings: &Settings) -> String {
     let mut text = format!(
-        "{rig}: {:.1} s of log, {} ticks lost, links up to {:.0}° from hanging\n",
+        "{rig}: {:.1} s of log, {} {}, links up to {:.0}° from hanging\n",
         found.seconds,
         found.lost_ticks,
+        if found.rows.is_some() { "rows missing" } else { "ticks lost" },
         found.largest_angle_rad.to_degrees()
     );
     // Writing into a string cannot fail.
@@ -37,7 +42,7 @@ pub fn text(rig: &str, found: &Identification, settings: &Settings) -> String {
         "parameter", "file", "found", "deviation", "change/σ"
     );
     for estimate in &found.estimates {
-        let _ = writeln!(text, "{}", row(estimate));
+        let _ = writeln!(text, "{}", row(found, estimate));
     }
     if !found.channels.is_empty() {
         fits(&mut text, found);
@@ -71,7 +76,11 @@ pub(super) fn windows(found: &Identification) -> Vec<(&'static str, &[WindowErro
 /// Channel, window, and errors in percent with the old file and the new numbers.
 pub(super) fn window_rows(errors: &WindowErrors) -> Vec<[String; 4]> {
     let row = |channel: &ChannelError| {
-        let [file, found] = channel.percent().map(|percent| significant(percent, 3));
+        let percent = |percent: f64| match percent.is_finite() {
+            true => significant(percent, 3),
+            false => DIVERGES.to_owned(),
+        };
+        let [file, found] = channel.percent().map(percent);
         [channel.name.clone(), format!("{} s", errors.window_s), file, found]
     };
     errors.channels.iter().map(row).collect()
@@ -85,28 +94,49 @@ fn fits(text: &mut String, found: &Identification) {
     );
     for channel in &found.channels {
         let [old, new] = channel.held_out.map(|error| error_text(channel.channel, error));
-        let _ =
-            writeln!(text, "  {:<10}{:>22.2}{old:>26}{new:>14}", channel.name, channel.innovation_variance);
+        let variance = variance_text(channel);
+        let _ = writeln!(text, "  {:<10}{variance:>22}{old:>26}{new:>14}", channel.name);
     }
 }
 
 fn error_text(channel: usize, error: f64) -> String {
     match channel {
+        _ if !error.is_finite() => DIVERGES.to_owned(),
         0 => format!("{} mm", significant(1e3 * error, 3)),
         _ => format!("{}°", significant(error.to_degrees(), 3)),
     }
 }
 
-fn row(estimate: &Estimate) -> String {
-    let [name, file, found, deviation, change, unit, held] = row_texts(estimate);
+/// Variance of the innovations of a channel.
+pub(super) fn variance_text(channel: &ChannelFit) -> String {
+    match channel.innovation_variance.is_finite() {
+        true => format!("{:.2}", channel.innovation_variance),
+        false => DIVERGES.to_owned(),
+    }
+}
+
+fn row(found: &Identification, estimate: &Estimate) -> String {
+    let [name, file, found, deviation, change, unit, held] = row_texts(found, estimate);
     let held = if held.is_empty() { held } else { format!(", {held}") };
     format!("  {name:<32}{file:>13}{found:>13}{deviation:>12}{change:>9}  {unit}{held}")
 }
 
 /// Name, value of the file, value found, its deviation, change over deviation, unit, and a remark if the prior
 /// dominates.
-pub(super) fn row_texts(estimate: &Estimate) -> [String; 7] {
+pub(super) fn row_texts(found: &Identification, estimate: &Estimate) -> [String; 7] {
     let (name, unit) = estimate.kind.name_and_unit();
+    if found.refusal.is_some() && !estimate.is_possible() {
+        let [found, none] = ["impossible".to_owned(), String::new()];
+        return [
+            name,
+            significant(estimate.old, 5),
+            found,
+            none.clone(),
+            none,
+            unit.to_owned(),
+            String::new(),
+        ];
+    }
     [
         name,
         significant(estimate.old, 5),
@@ -149,8 +179,14 @@ fn scale_note(found: &Identification, settings: &Settings) -> String {
 
 /// What a reader has to know to judge the numbers.
 pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
+    let doubts = found.doubts.iter().map(ToString::to_string);
+    // The others are of numbers that are written.
+    if found.refusal.is_some() {
+        return doubts.chain(row_notes(found)).collect();
+    }
     let mut notes = vec![scale_note(found, settings)];
-    notes.extend(found.doubts.iter().map(ToString::to_string));
+    notes.extend(doubts);
+    notes.extend(row_notes(found));
     notes.push(
         "Single masses cannot be seen from outside: the new file keeps those of the old one where it can, and centres and \
          inertias follow."
@@ -177,6 +213,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
         ));
     }
     match (found.other_delay(), found.estimate(ParameterKind::Delay)) {
+        (_, Some(estimate)) if found.late_ticks != 0 => notes.push(late_note(found, estimate)),
         (Some(delay), Some(estimate)) => notes.push(format!(
             "The force comes {:.2} ticks later than delay_ticks: set delay_ticks = {delay}; the new file has it.",
             estimate.new
@@ -199,6 +236,45 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
     notes
 }
 
+/// What fewer or uneven rows cost.
+fn row_notes(found: &Identification) -> Vec<String> {
+    let Some(rows) = &found.rows else { return Vec::new() };
+    let mut notes = vec![
+        "No recording shows whether its times are right: with times twice as long, second moments are found four times as large."
+            .to_owned(),
+    ];
+    if rows.costs() > DEAR {
+        notes.push(format!(
+            "Rows every {} ms instead of every 2 ms: by the Cramér–Rao bound, they make the deviations {:.1} times as large (the \
+             fastest mode of the hanging links has a period of {:.0} ms).",
+            significant(1e3 * rows.period_s, 3),
+            rows.costs(),
+            1e3 * rows.fastest_s
+        ));
+    }
+    if rows.uneven_s > 0.0 || found.lost_ticks > 0 {
+        notes.push(format!(
+            "The rows are off even times by {} ms (rms) and {} are missing: values are interpolated. If only the times are uneven, \
+             not the measurements, they look like errors of the angles.",
+            significant(1e3 * rows.uneven_s, 2),
+            found.lost_ticks
+        ));
+    }
+    notes
+}
+
+/// A drive that is whole ticks late.
+fn late_note(found: &Identification, delay: &Estimate) -> String {
+    let (unit, remedy) = match found.rows {
+        Some(_) => ("rows", "as if its column was recorded that much earlier; the numbers allow for it"),
+        None => {
+            ("ticks", "and delay_ticks is at most 1: look for what delays it, or state it as driver_lag_s")
+        }
+    };
+    let (by, when) = (significant(delay.new.abs(), 3), if delay.new > 0.0 { "later" } else { "earlier" });
+    format!("The force comes {by} {unit} {when} than the file says, {remedy}.")
+}
+
 /// The identification as a JSON object.
 pub fn json(rig: &str, found: &Identification) -> Value {
     let estimates: Vec<Value> = found
@@ -207,7 +283,8 @@ pub fn json(rig: &str, found: &Identification) -> Value {
         .map(|estimate| {
             let (name, unit) = estimate.kind.name_and_unit();
             json!({
-                "name": name, "unit": unit, "file": estimate.old, "found": estimate.new,
+                "name": name, "unit": unit, "file": estimate.old,
+                "found": (found.refusal.is_none() || estimate.is_possible()).then_some(estimate.new),
                 "deviation": estimate.deviation, "halves": estimate.halves, "held_by_prior": estimate.held_by_prior,
             })
         })
@@ -230,6 +307,9 @@ pub fn json(rig: &str, found: &Identification) -> Value {
     });
     json!({
         "rig": rig, "seconds": found.seconds, "lost_ticks": found.lost_ticks,
+        "rows": found.rows.map(|rows| json!({
+            "period_s": rows.period_s, "uneven_s": rows.uneven_s, "fastest_mode_s": rows.fastest_s, "deviations_times": rows.costs(),
+        })),
         "largest_angle_rad": found.largest_angle_rad, "wiring": wiring, "estimates": estimates,
         "is_driven": found.is_driven, "is_moved": found.is_moved, "left_out": windows_json(&found.left_out), "predicted": windows_json(&found.predicted),
         "channels": channels, "delay_ticks": found.other_delay().unwrap_or(found.delay_ticks),

@@ -47,6 +47,8 @@ impl Column {
     /// What is wrong with the name.
     pub(super) fn of(name: &str) -> Result<Self, String> {
         let name = name.trim().to_lowercase().replace([' ', '.', '[', '(', '/'], "_").replace([']', ')'], "");
+        let words: Vec<&str> = name.split('_').filter(|word| !word.is_empty()).collect();
+        let name = words.join("_");
         if name == "-" {
             return Ok(Column::Ignored);
         }
@@ -90,7 +92,7 @@ fn time(unit: &str) -> Result<Column, String> {
     match unit {
         "s" => Ok(Column::Time(1.0)),
         "ms" => Ok(Column::Time(1e-3)),
-        "us" => Ok(Column::Time(1e-6)),
+        "us" | "µs" | "μs" => Ok(Column::Time(1e-6)),
         _ => Err("its unit is open: call it time_s, time_ms or time_us".to_owned()),
     }
 }
@@ -126,6 +128,9 @@ mod tests {
         assert_eq!(Column::of("Theta1 [deg]"), angle(0, ColumnScale::Factor(PI / 180.0), false));
         assert_eq!(Column::of("joint1_counts"), angle(0, ColumnScale::Counts, true));
         assert_eq!(Column::of("t_ms"), Ok(Column::Time(1e-3)));
+        for name in ["time_ms", "time [ms]", "Time (ms)", "t [ms]"] {
+            assert_eq!(Column::of(name), Ok(Column::Time(1e-3)), "{name}");
+        }
         assert_eq!(Column::of("x_mm"), Ok(Column::Cart(ColumnScale::Factor(1e-3))));
         assert_eq!(Column::of("u_v"), Ok(Column::Voltage));
         for name in ["theta1", "time", "x", "angle_0_rad", "angle_1_rad_per_s", "current_a"] {

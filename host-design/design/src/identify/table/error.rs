@@ -24,7 +24,7 @@ pub enum RecordingError {
     },
     /// A line has another number of fields than there are columns.
     #[error(
-        "line {line}: has {found} fields instead of {wanted}; correct the line, or the names of the columns"
+        "line {line}: has {found} fields instead of {wanted}; {}", if *is_decimal { DECIMAL } else { FIELDS }
     )]
     Fields {
         /// Line.
@@ -33,6 +33,8 @@ pub enum RecordingError {
         found: usize,
         /// Number of columns.
         wanted: usize,
+        /// Whether the commas of numbers may have been taken for separators.
+        is_decimal: bool,
     },
     /// A field is not a finite number.
     #[error("line {line}, column {column}: {text:?} is not a number; correct it, or cut the file there")]
@@ -77,6 +79,9 @@ pub enum RecordingError {
         remedy: String,
     },
 }
+
+const FIELDS: &str = "correct the line, or the names of the columns";
+const DECIMAL: &str = "with decimal commas, separate the columns by semicolons or tabs";
 
 fn advice(columns: &str) -> String {
     format!(

@@ -34,7 +34,8 @@ impl RecordingTable {
         Self::from_text(&text, reading, links)
     }
 
-    /// Reads a table whose fields are separated by commas, semicolons, tabs or spaces.
+    /// Reads a table whose fields are separated by commas, semicolons, tabs or spaces. Where it is not commas, a
+    /// decimal comma is read as a point.
     ///
     /// # Errors
     /// [`RecordingError`], with line and column.
@@ -43,8 +44,9 @@ impl RecordingTable {
         let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         let mut lines = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).peekable();
         let &(line, first) = lines.peek().ok_or(RecordingError::Empty)?;
-        let split = split_at(first);
-        let has_names = split(first).iter().any(|field| field.parse::<f64>().is_err());
+        let separator = separator(first);
+        let split = |line| split(line, separator);
+        let has_names = split(first).iter().any(|field| number(field, separator).is_none());
         if has_names {
             lines.next();
         }
@@ -58,20 +60,20 @@ impl RecordingTable {
         };
         let mut table = Self { names, values: Vec::new(), lines: Vec::new() };
         for (line, text) in lines {
-            table.add(line, &split(text))?;
+            table.add(line, &split(text), separator)?;
         }
         if table.lines.is_empty() { Err(RecordingError::Empty) } else { Ok(table) }
     }
 
-    fn add(&mut self, line: usize, fields: &[&str]) -> Result<(), RecordingError> {
+    fn add(&mut self, line: usize, fields: &[&str], separator: Option<char>) -> Result<(), RecordingError> {
         let (found, wanted) = (fields.len(), self.names.len());
         if found != wanted {
-            return Err(RecordingError::Fields { line, found, wanted });
+            let is_decimal = separator == Some(',') && found == 2 * wanted;
+            return Err(RecordingError::Fields { line, found, wanted, is_decimal });
         }
         for (name, field) in self.names.iter().zip(fields) {
-            let number = field.parse().ok().filter(|number: &f64| number.is_finite());
             // A column that is not used may hold anything.
-            let number = if name == "-" { Some(0.0) } else { number };
+            let number = if name == "-" { Some(0.0) } else { number(field, separator) };
             self.values.push(number.ok_or_else(|| RecordingError::Number {
                 line,
                 column: name.clone(),
@@ -82,19 +84,44 @@ impl RecordingTable {
         Ok(())
     }
 
+    /// Number of rows.
+    pub(in crate::identify) fn rows(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// The first rows.
+    pub(in crate::identify) fn beginning(&self, rows: usize) -> Self {
+        let rows = rows.min(self.lines.len());
+        Self {
+            names: self.names.clone(),
+            values: self.values[..rows * self.names.len()].to_vec(),
+            lines: self.lines[..rows].to_vec(),
+        }
+    }
+
     /// The numbers of a row.
     pub(super) fn row(&self, row: usize) -> &[f64] {
         &self.values[row * self.names.len()..][..self.names.len()]
     }
 }
 
-/// Splits lines as `first` is split: at its commas, semicolons, tabs or spaces.
-fn split_at(first: &str) -> impl Fn(&str) -> Vec<&str> {
-    let separator = [',', ';', '\t'].into_iter().find(|&separator| first.contains(separator));
-    move |line| match separator {
+/// What separates the fields of a line as `first`: semicolons or tabs before commas, which may be those of numbers.
+fn separator(first: &str) -> Option<char> {
+    [';', '\t', ','].into_iter().find(|&separator| first.contains(separator))
+}
+
+fn split(line: &str, separator: Option<char>) -> Vec<&str> {
+    match separator {
         Some(separator) => line.split(separator).map(bare).collect(),
         None => line.split_whitespace().map(bare).collect(),
     }
+}
+
+/// The number of a field; where commas do not separate fields, one may stand for the decimal point.
+fn number(field: &str, separator: Option<char>) -> Option<f64> {
+    let is_decimal = separator != Some(',') && !field.contains('.');
+    let number = if is_decimal { field.replacen(',', ".", 1).parse() } else { field.parse() };
+    number.ok().filter(|number: &f64| number.is_finite())
 }
 
 /// A field without the spaces and quotes around it.

@@ -10,7 +10,7 @@ use crate::variation::positive;
 #[command(next_help_heading = "Tables of other programs")]
 pub(crate) struct ReadingArgs {
     /// Names of the columns, instead of those in the file: time_s, x_m, angle_1_rad …, force_n, voltage_v, duty, -
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', allow_hyphen_values = true)]
     columns: Vec<String>,
     /// Time from one row to the next (s), if no column has the time
     #[arg(long, value_name = "S", value_parser = positive)]
