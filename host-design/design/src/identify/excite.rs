@@ -35,9 +35,6 @@ const LOWEST_MOVED: f64 = 0.7;
 pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
 /// A run is abandoned when the cart goes beyond this share of the rail.
 const STOP: f64 = 0.85;
-/// Integration substeps per tick with a motor. Its force is held over a substep, so the back-EMF lags by half of one.
-/// With the usual 4 substeps, the identified masses are 0.15 to 0.4 % too small.
-const SUBSTEPS: usize = 32;
 /// Factors on the amplitude that are tried one after the other, in case the machine moves more than the model.
 const RETRIES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
 /// The amplitude is raised while the machine moves less than this share of the intended motion: the share, the largest
@@ -245,9 +242,8 @@ fn motion(rig: &Rig, log: &Log) -> Result<f64, IdentifyError> {
 fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<Option<Log>, IdentifyError> {
     let chain = chain_of(rig)?;
     let channels = chain.links.len() + 1;
-    let usual = Scenario::at_rest(machine, Law::Lqr);
-    let substeps = if rig.actuator.motor.is_some() { SUBSTEPS } else { usual.substeps };
-    let scenario = Scenario { start: hanging_by_hand(machine), seed, substeps, ..usual };
+    let scenario =
+        Scenario { start: hanging_by_hand(machine), seed, ..Scenario::at_rest(machine, Law::Lqr) };
     let failed = |error: &dyn std::fmt::Display| IdentifyError::Excitation(error.to_string());
     let mut bench = Bench::new(machine, &scenario).map_err(|error| failed(&error))?;
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
