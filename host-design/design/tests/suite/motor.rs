@@ -1,30 +1,17 @@
 //! The motor in the simulated machine, against closed forms, and against itself in more integration steps.
 
-use std::path::Path;
-
 use upright::control::actuator::Drive;
 use upright::table::Law;
 use upright_design::plant::{MotorPlant, chain_plant};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, Sensing, simulate};
 
-use crate::published::{rig_path, table};
+use crate::published::{first_hour, rig, table};
 
 /// Gear ratios from a usual one to one that nobody should build.
 const GEARS: [f64; 6] = [6.3, 40.0, 52.0, 60.0, 150.0, 630.0];
 
-/// The rig of docs/first-hour.md with this gear ratio.
-fn first_hour(gear_ratio: f64) -> Rig {
-    let guide =
-        std::fs::read_to_string(upright_test_support::repository().join("docs/first-hour.md")).unwrap();
-    let (_, rest) = guide.split_once("```toml\n").unwrap();
-    let (text, _) = rest.split_once("```").unwrap();
-    let geared = text.replace("gear_ratio = 6.3", &format!("gear_ratio = {gear_ratio:?}"));
-    assert!(gear_ratio == 6.3 || geared != text);
-    Rig::from_toml(&geared, Path::new("first-hour.toml")).unwrap()
-}
-
-/// The same without anything but motor and cart: the link is a mote.
+/// The rig of docs/first-hour.md with this gear ratio and without anything but motor and cart: the link is a mote.
 fn cart_alone(gear_ratio: f64) -> Rig {
     let mut rig = first_hour(gear_ratio);
     let chain = rig.chain_mut().unwrap();
@@ -182,13 +169,11 @@ fn no_number_of_integration_steps_decides_how_a_rig_balances() {
         "single-stepper",
         "double-stepper",
     ] {
-        let rig = Rig::from_path(&rig_path(name)).unwrap();
-        let found = change(&rig, [4, 8], 1.0);
+        let found = change(&rig(name), [4, 8], 1.0);
         assert!(found < 1e-6, "{name}: {found:.1e}");
     }
     // Negative control: dry friction in two steps.
-    let sticking = Rig::from_path(&rig_path("triple-multiarm")).unwrap();
-    let found = change(&sticking, [1, 2], 1.0);
+    let found = change(&rig("triple-multiarm"), [1, 2], 1.0);
     assert!(found > 1e-6, "{found:.1e}");
 }
 
