@@ -20,6 +20,16 @@ pub fn rig(name: &str) -> Rig {
     Rig::from_path(&rig_path(name)).unwrap()
 }
 
+/// The rig that docs/first-hour.md describes, with a gear ratio of its own.
+pub fn first_hour(gear_ratio: f64) -> Rig {
+    let guide = std::fs::read_to_string(crate::repository().join("docs/first-hour.md")).unwrap();
+    let (_, rest) = guide.split_once("```toml\n").unwrap();
+    let (text, _) = rest.split_once("```").unwrap();
+    let geared = text.replace("gear_ratio = 6.3", &format!("gear_ratio = {gear_ratio:?}"));
+    assert!(gear_ratio == 6.3 || geared != text);
+    Rig::from_toml(&geared, Path::new("first-hour.toml")).unwrap()
+}
+
 /// The design of the rig in file `name`.
 pub fn designed(name: &str) -> &'static Certified {
     certified(&rig(name))

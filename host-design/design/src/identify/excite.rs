@@ -38,9 +38,6 @@ pub(super) const AIM: (f64, f64) = (60.0 * PI / 180.0, 0.6);
 const STOP: f64 = 0.85;
 /// Largest intended share of the angle that a potentiometer reads, to the nearer side of hanging.
 const READ_SHARE: f64 = 0.8;
-/// Integration substeps per tick with a motor. Its force is held over a substep, so the back-EMF lags by half of one.
-/// With the usual 4 substeps, the identified masses are 0.15 to 0.4 % too small.
-const SUBSTEPS: usize = 32;
 /// Factors on the amplitude that are tried one after the other, in case the machine moves more than the model.
 const RETRIES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
 /// The amplitude is raised while the machine moves less than this share of the intended motion: the share, the largest
@@ -48,9 +45,13 @@ const RETRIES: [f64; 4] = [1.0, 0.7, 0.5, 0.35];
 const RAISE: (f64, f64, usize) = (0.8, 1.6, 3);
 /// Time over which the force is ramped up at the beginning and down at the end (s).
 const RAMP_S: f64 = 1.0;
-/// Longest trial run that is used to find the amplitude (s).
+/// Longest first trial run in the search for an amplitude (s).
 const TRIAL_S: f64 = 20.0;
-/// Share of the force limit that the excitation may need, or of the limits of a drive that imposes the cart's motion.
+/// Intervals for which the motion of the model is kept (s).
+const REACH_S: f64 = 0.5;
+/// Steps of the search for an amplitude.
+const BISECTIONS: usize = 12;
+/// Share of the force limit and of the speed limit that the excitation may need.
 const INPUT_SHARE: f64 = 0.8;
 
 /// A sum of sines of equal force, with a weak spring and damper that keep the cart near the middle:
@@ -68,6 +69,8 @@ pub struct Excitation {
     pub damping_n_s_per_m: f64,
     /// Duration (s).
     pub duration_s: f64,
+    /// How far the model moves in each [`REACH_S`], as a share of the intended motion.
+    reach: Vec<f64>,
 }
 
 impl Excitation {
@@ -94,6 +97,7 @@ impl Excitation {
             stiffness_n_per_m: mass * slow * slow,
             damping_n_s_per_m: 1.4 * mass * slow,
             duration_s,
+            reach: Vec::new(),
         };
         excitation.find_amplitude(rig, chain);
         Ok(excitation)
@@ -111,7 +115,15 @@ impl Excitation {
         self.amplitude_n * ramp * sum
     }
 
-    /// Finds by bisection the largest amplitude for which the model stays within [`AIM`] and the force limit.
+    /// How far the model moves from `from_s` to `to_s` (s), as a share of the intended motion: at most 1. Before the end of
+    /// the run, 1 is reached once.
+    pub(super) fn reach(&self, from_s: f64, to_s: f64) -> f64 {
+        let [from, to] = [from_s / REACH_S, to_s / REACH_S].map(|at| at.max(0.0) as usize);
+        self.reach.iter().take(to).skip(from).copied().fold(0.0, f64::max)
+    }
+
+    /// Finds by bisection the largest amplitude for which the model stays within [`AIM`] and the limits of force and speed
+    /// for the whole run. Of a long one, the beginning nearly always says enough.
     fn find_amplitude(&mut self, rig: &Rig, chain: &Chain) {
         let record = Record::of(rig, &[], 1);
         let model = record.model(chain.gravity_m_per_s2);
@@ -119,41 +131,56 @@ impl Excitation {
         p[Layout { links: chain.links.len() }.delay()] = 0.0;
         let weight = moved_mass(rig, chain) * chain.gravity_m_per_s2;
         let limit = rig.input_limit().unwrap_or(f64::INFINITY);
-        let (mut low, mut high) = (0.0, weight.min(limit));
-        for _ in 0..12 {
-            self.amplitude_n = 0.5 * (low + high);
-            if self.stays(&model, &p, chain, rig, limit) {
-                low = self.amplitude_n;
-            } else {
-                high = self.amplitude_n;
+        let mut largest = weight.min(limit);
+        for length_s in [TRIAL_S.min(self.duration_s), self.duration_s] {
+            let mut trial = |amplitude_n: f64| {
+                self.amplitude_n = amplitude_n;
+                self.moved(&model, &p, rig, length_s)
+            };
+            if let Some(reach) = trial(largest) {
+                self.reach = reach;
+                continue;
             }
+            let mut low = 0.0;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (low + largest);
+                if trial(middle).is_some() {
+                    low = middle;
+                } else {
+                    largest = middle;
+                }
+            }
+            largest = low;
+            self.reach = trial(low).unwrap_or_default();
         }
-        self.amplitude_n = low;
     }
 
-    fn stays(&self, model: &Model, p: &[f64], chain: &Chain, rig: &Rig, limit_n: f64) -> bool {
+    /// How far the model moves in each [`REACH_S`] of the first `length_s` (s), as a share of the intended motion; none if it
+    /// goes beyond that or a limit.
+    fn moved(&self, model: &Model, p: &[f64], rig: &Rig, length_s: f64) -> Option<Vec<f64>> {
         let m = model.coordinates();
         let dt_s = rig.tick.period_s * Record::usual_stride(rig.tick.period_s) as f64;
-        let (widest, farthest) = (aim_rad(rig), AIM.1 * half_rail(chain));
+        let (widest, farthest) = (aim_rad(rig), AIM.1 * half_rail(rig.chain()?));
         let fastest = INPUT_SHARE * speed_limit(rig).unwrap_or(f64::INFINITY);
+        let limit_n = rig.input_limit().unwrap_or(f64::INFINITY);
         let mut state = vec![0.0; model.states()];
         state[1..m].fill(PI);
         let mut step = Step::new(model, false);
-        for k in 0..(TRIAL_S.min(self.duration_s) / dt_s) as usize {
+        let mut reach = Vec::new();
+        for k in 0..(length_s / dt_s) as usize {
             let force = self.force_n(k as f64 * dt_s, state[0], state[m]);
             step.take(model, p, &state, &CartForce { force, ..CartForce::default() }, dt_s);
             state.copy_from_slice(&step.end);
             let turned = state[1..m].iter().map(|phi| (phi - PI).abs()).fold(0.0, f64::max);
+            let share = (turned / widest).max(state[0].abs() / farthest);
             // Written so that NaN counts as leaving the limits.
-            let stays = turned <= widest
-                && state[0].abs() <= farthest
-                && state[m].abs() <= fastest
-                && force.abs() <= INPUT_SHARE * limit_n;
-            if !stays {
-                return false;
+            if !(share <= 1.0 && state[m].abs() <= fastest && force.abs() <= INPUT_SHARE * limit_n) {
+                return None;
             }
+            reach.resize((k as f64 * dt_s / REACH_S) as usize + 1, 0.0);
+            reach.iter_mut().last().into_iter().for_each(|last: &mut f64| *last = last.max(share));
         }
-        true
+        Some(reach)
     }
 }
 
@@ -177,11 +204,11 @@ fn moved_mass(rig: &Rig, chain: &Chain) -> f64 {
     }
 }
 
-/// Largest speed of a cart whose drive imposes its motion (m/s); none with another drive, or without a limit.
+/// Largest speed of the cart (m/s): that of the file, and of a drive that imposes its motion; none without a limit.
 fn speed_limit(rig: &Rig) -> Option<f64> {
-    let drive = rig.actuator.acceleration.as_ref()?;
-    let both = drive.largest_speed_m_per_s(rig.tick.period_s).into_iter().chain(rig.limits.speed_m_per_s);
-    both.reduce(f64::min)
+    let drive = rig.actuator.acceleration.as_ref();
+    let of_drive = drive.and_then(|drive| drive.largest_speed_m_per_s(rig.tick.period_s));
+    of_drive.into_iter().chain(rig.limits.speed_m_per_s).reduce(f64::min)
 }
 
 /// The log of the simulated machine of `rig`, with its `[reality]`, shaken for `duration_s`.
@@ -237,9 +264,7 @@ fn motion(rig: &Rig, log: &Log) -> Result<f64, IdentifyError> {
 fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<Option<Log>, IdentifyError> {
     let chain = chain_of(rig)?;
     let channels = chain.links.len() + 1;
-    let usual = Scenario::at_rest(machine, Law::Lqr);
-    let substeps = if rig.actuator.motor.is_some() { SUBSTEPS } else { usual.substeps };
-    let scenario = Scenario { start: hanging_by_hand(machine), seed, substeps, ..usual };
+    let scenario = Scenario { start: hanging_by_hand(machine), seed, ..Scenario::at_rest(machine, Law::Lqr) };
     let failed = |error: &dyn std::fmt::Display| IdentifyError::Excitation(error.to_string());
     let mut bench = Bench::new(machine, &scenario).map_err(|error| failed(&error))?;
     let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();

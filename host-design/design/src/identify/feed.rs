@@ -21,11 +21,15 @@ const SPEED_S: f64 = 0.04;
 const FOLLOWS: f64 = 0.1;
 /// Interval at which the motion is judged, and the amplitude changed if the rig moves too much or too little (s).
 const ADAPT_S: f64 = 4.0;
-/// The amplitude is raised if the rig moves less than this share of the intended motion: the share, the largest factor
+/// The amplitude is raised if the rig moves less than this share of what the model does: the share, the largest factor
 /// at a time, and the largest factor in total.
 const RAISE: (f64, f64, f64) = (0.8, 1.3, 3.0);
-/// The amplitude is multiplied by this factor if the rig moves more than intended.
+/// The amplitude is multiplied by this factor, or a smaller one, if the rig moves more than intended.
 const LOWER: f64 = 0.7;
+/// It is not raised after an interval in which the model moves less than this share of the intended motion.
+const QUIET: f64 = 0.25;
+/// The amplitude is lowered at once beyond this multiple of the intended motion, and then not again within a time (s).
+const BEYOND: (f64, f64) = (1.1, 1.0);
 /// Number of ticks by which forces are sent ahead.
 const SENT_AHEAD: u32 = 3 * AHEAD as u32 / 4;
 /// Largest force allowed, over the largest force of the excitation: leaves room for spring and damper.
@@ -54,6 +58,8 @@ pub struct Feed {
     gain: f64,
     /// Tick at which the motion is judged next.
     judged: u32,
+    /// Tick from which the amplitude may be lowered at once.
+    alert: u32,
 }
 
 impl Feed {
@@ -88,6 +94,7 @@ impl Feed {
             checked: if is_moved { PULSES_S.len() } else { 0 },
             gain: 1.0,
             judged: 0,
+            alert: 0,
         })
     }
 
@@ -117,7 +124,11 @@ impl Feed {
         };
         self.check_pulses(log, begun)?;
         if last >= self.judged {
-            self.adapt(log, last);
+            self.adapt(log, begun, last);
+        }
+        if last >= self.alert && self.share_at(log, log.ticks().len() - 1) > BEYOND.0 {
+            self.gain *= LOWER;
+            self.alert = last + self.ticks(BEYOND.1);
         }
         let mut requests = Vec::new();
         // No force is sent for later ticks: spring and damper bring the cart back.
@@ -201,30 +212,40 @@ impl Feed {
         Some(f64::from(moved) * self.steps[0] / (f64::from(at - since) * self.period_s))
     }
 
-    /// Adapts the amplitude to the motion since the last call.
-    fn adapt(&mut self, log: &Log, last: u32) {
+    /// Adapts the amplitude to the motion since the last call: so that, if the rig goes on moving by this multiple of what
+    /// the model does, its largest motion is the intended one.
+    fn adapt(&mut self, log: &Log, begun: u32, last: u32) {
         let from = self.judged.saturating_sub(self.ticks(ADAPT_S));
         self.judged = last + self.ticks(ADAPT_S);
-        let mut most = 0.0f64;
         let first = log.ticks().partition_point(|tick| tick.number < from);
-        for index in first..log.ticks().len() {
-            let deviation = |channel: usize| {
-                let counts = log.counts(index)[channel].wrapping_sub(log.header.hanging[channel]) as i16;
-                f64::from(counts) * self.steps[channel]
-            };
-            let mut angle = 0.0;
-            for joint in 1..log.channels() {
-                angle += deviation(joint);
-                most = most.max(angle.abs() / self.aim_rad);
-            }
-            most = most.max(deviation(0).abs() / (AIM.1 * self.half_rail_m));
-        }
+        let most = (first..log.ticks().len()).map(|index| self.share_at(log, index)).fold(0.0, f64::max);
+        let time_s = |tick: u32| f64::from(tick - begun) * self.period_s - LEAD_S;
+        let of_model = self.excitation.reach(time_s(from.max(begun)), time_s(last));
+        let wanted = self.gain * of_model / most;
         self.gain = if most > 1.0 {
-            LOWER * self.gain
-        } else if most < RAISE.0 {
-            (self.gain * (1.0 / most).min(RAISE.1)).min(RAISE.2)
+            wanted.min(LOWER * self.gain)
+        } else if of_model < QUIET {
+            self.gain
+        } else if most > of_model {
+            wanted
+        } else if most < RAISE.0 * of_model {
+            wanted.min(RAISE.1 * self.gain).min(RAISE.2)
         } else {
             self.gain
         };
+    }
+
+    /// How far the rig is from where it hung, as a share of the intended motion, in this row of the log.
+    fn share_at(&self, log: &Log, index: usize) -> f64 {
+        let deviation = |channel: usize| {
+            let counts = log.counts(index)[channel].wrapping_sub(log.header.hanging[channel]) as i16;
+            f64::from(counts) * self.steps[channel]
+        };
+        let (mut angle, mut most) = (0.0, deviation(0).abs() / (AIM.1 * self.half_rail_m));
+        for joint in 1..log.channels() {
+            angle += deviation(joint);
+            most = most.max(angle.abs() / self.aim_rad);
+        }
+        most
     }
 }

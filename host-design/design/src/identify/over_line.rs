@@ -165,6 +165,8 @@ impl OverLine {
 
     fn answered(&mut self, request: Request, answer: Answer) -> Result<(), LineError> {
         match answer {
+            // Forces that come after the shaking has ended: telemetry says what has ended it.
+            Answer::NotNow(_) if self.is_shaken => {}
             Answer::NotNow(inhibits) => return Err(LineError::NotNow(inhibits)),
             Answer::Rejected(_) => return Err(HarnessError::Refused { request, answer }.into()),
             Answer::Info(info) => Mismatch::check(&info, self.expected).map_err(HarnessError::from)?,

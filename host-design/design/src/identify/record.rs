@@ -23,6 +23,8 @@ use crate::rig::{Motor, Rig};
 const LONGEST_S: f64 = 0.0021;
 /// Longest integration step (s) with a force.
 const LONGEST_STEP_S: f64 = 0.0101;
+/// Most of the time constant with which a motor stops the cart in one integration step.
+const LARGEST_SHARE: f64 = 0.5;
 /// Shortest piece without a lost tick that is used (s).
 const SHORTEST_PIECE_S: f64 = 1.0;
 
@@ -50,6 +52,8 @@ pub(super) struct Record {
     /// Noise of each channel besides the rounding to steps, root mean square (m, rad).
     pub(super) noise: Vec<f64>,
     motor: Option<Motor>,
+    /// Time constant with which the back-EMF stops the cart alone (s); infinite without a motor.
+    stops_within_s: f64,
     /// Whether the force begins a tick after its command.
     is_late: bool,
     /// How it follows from then on: see [`shares_of_lag`].
@@ -80,6 +84,7 @@ impl Record {
             stride,
             dt_s: stride as f64 * period_s,
             motor: rig.actuator.motor.clone(),
+            stops_within_s: stops_within_s(rig).unwrap_or(f64::INFINITY),
             is_late: rig.tick.delay_ticks == 1,
             shares: shares_of_lag(lag_s(rig), period_s),
             is_clamped: false,
@@ -350,6 +355,14 @@ impl Record {
         if seconds < least { Err(IdentifyError::TooShort { seconds, least }) } else { Ok(()) }
     }
 
+    /// Integration steps between two samples: pulses may come in slow ticks, which are smooth steps only for a force, and
+    /// a motor with a large gear ratio stops the cart within a tick.
+    fn substeps(&self) -> usize {
+        let longest_s =
+            if self.is_moved { LONGEST_S } else { (LARGEST_SHARE * self.stops_within_s).min(LONGEST_STEP_S) };
+        (self.dt_s / longest_s).ceil().max(1.0) as usize
+    }
+
     /// Back-EMF as damping (N·s/m).
     fn back_emf(&self) -> f64 {
         self.motor.as_ref().map_or(0.0, Motor::braking_n_s_per_m)
@@ -366,11 +379,15 @@ impl Record {
             joints_excess_at_most: 0.0,
             half_at: super::stribeck::HALF_AT,
             is_imposed: self.is_clamped || self.is_moved,
-            // Pulses may come in slow ticks, which are smooth steps only for a force.
-            substeps: (self.dt_s / if self.is_moved { LONGEST_S } else { LONGEST_STEP_S }).ceil() as usize,
+            substeps: self.substeps(),
             has_bristles: false,
         }
     }
+}
+
+/// Time constant with which the back-EMF of a rig's motor stops its cart alone (s).
+fn stops_within_s(rig: &Rig) -> Option<f64> {
+    Some(rig.chain()?.cart.mass_kg? / rig.actuator.motor.as_ref()?.braking_n_s_per_m())
 }
 
 /// Value and slope at 0 of the parabola through `points` by least squares.

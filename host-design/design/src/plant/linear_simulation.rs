@@ -1,6 +1,6 @@
 //! Simulation of a plant that a rig file gives as a linear model.
 
-use super::{Energy, Plant};
+use super::{Actuation, Energy, Plant, integration_steps};
 use crate::numerics::Matrix;
 use crate::rig;
 
@@ -114,6 +114,33 @@ impl Plant for LinearSimulation {
                 }
             }
         }
+    }
+
+    /// By the classical Runge–Kutta method; the second state is the speed of the motor.
+    fn advance_with(&mut self, actuation: &dyn Actuation, disturbances: &[f64], dt: f64, substeps: usize) {
+        let steps = self.steps(actuation.damping_n_s_per_m(), dt, substeps);
+        let step_s = dt / steps as f64;
+        let states = self.state.len();
+        let (mut at, mut rate, mut sum) = (vec![0.0; states], vec![0.0; states], vec![0.0; states]);
+        for step in 0..steps {
+            let inputs = actuation.inputs(step as f64 * step_s, step_s);
+            at.copy_from_slice(&self.state);
+            sum.fill(0.0);
+            for (node, weight, next) in [(0, 1.0, 0.5), (1, 2.0, 0.5), (1, 2.0, 1.0), (2, 1.0, 0.0)] {
+                let speed = at.get(1).copied().unwrap_or_default();
+                self.rate(&at, actuation.force_n(inputs[node], speed), disturbances, &mut rate);
+                for i in 0..states {
+                    sum[i] += weight * rate[i];
+                    at[i] = self.state[i] + next * step_s * rate[i];
+                }
+            }
+            self.state.iter_mut().zip(&sum).for_each(|(state, sum)| *state += step_s / 6.0 * sum);
+        }
+    }
+
+    fn steps(&self, damping_n_s_per_m: f64, dt: f64, substeps: usize) -> usize {
+        let per_newton = self.inputs.entries().get(self.inputs.cols()).map_or(0.0, |b| b.abs());
+        integration_steps(self.norm + damping_n_s_per_m * per_newton, dt, substeps)
     }
 
     fn energy(&self) -> Option<Energy> {

@@ -17,11 +17,13 @@
 //! - [`linearise`]: the exact linear model about an equilibrium, in any precision.
 //! - [`ChainPlant`]: the nonlinear equations in `f64`, fast, with n as a const parameter; their source is
 //!   [`upright::plant`].
+//! - [`Actuation`]: a force that follows the speed of its motor.
 //! - [`Plant`]: the interface of a simulation of any size; [`chain_plant`] and [`LinearSimulation`] provide it.
 //! - [`ChainLanes`]: several chains that advance together in the processor's SIMD vectors, with the same bits as each
 //!   alone.
 //! - [`reference::integrate`]: an adaptive integrator of high order, the reference for the fast one.
 
+mod actuation;
 mod angles;
 mod chain;
 mod error;
@@ -37,6 +39,8 @@ mod rk4;
 mod simulation;
 mod together;
 
+pub use actuation::Actuation;
+pub(crate) use actuation::{LARGEST_SHARE, MOST_STEPS, integration_steps};
 pub use angles::{absolute_angles, whole_turns, without_turns};
 pub use chain::{ChainPlant, Energy, WideChainState};
 pub use error::PlantError;

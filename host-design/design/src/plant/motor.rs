@@ -27,12 +27,13 @@ impl MotorPlant {
     /// Force on the cart (N) at `duty` (clamped to -1 … 1) and cart speed `speed` (m/s). The dead zone reduces the
     /// magnitude of the voltage; a voltage inside the dead zone counts as zero.
     pub fn force(&self, duty: f64, speed: f64) -> f64 {
-        self.force_at_supply(duty, speed, self.supply_v)
+        self.force_at_supply(duty.clamp(-1.0, 1.0), speed, self.supply_v)
     }
 
-    /// As [`MotorPlant::force`], at another supply voltage (V).
+    /// As [`MotorPlant::force`], at another supply voltage (V), and with a duty that is not clamped: a step with the
+    /// impulse of a duty that fades within it may need a larger one.
     pub fn force_at_supply(&self, duty: f64, speed: f64, supply_v: f64) -> f64 {
-        let volts = duty.clamp(-1.0, 1.0) * supply_v;
+        let volts = duty * supply_v;
         let effective = volts.signum() * (volts.abs() - self.dead_zone_v).max(0.0);
         self.newtons_per_volt * (effective - self.volts_per_speed * speed)
     }
@@ -50,6 +51,11 @@ impl MotorPlant {
     /// Back-EMF per speed of the cart (V·s/m).
     pub fn volts_per_speed(&self) -> f64 {
         self.volts_per_speed
+    }
+
+    /// Decrease of the force per speed of the cart (N·s/m).
+    pub fn braking_n_s_per_m(&self) -> f64 {
+        self.newtons_per_volt * self.volts_per_speed
     }
 
     /// Supply voltage without load (V).

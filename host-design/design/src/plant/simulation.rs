@@ -1,6 +1,7 @@
 //! Simulation of a plant of any size behind one object-safe trait.
 
-use super::{ChainPlant, Energy, PlantError, WideChainState};
+use super::rk4::rk4;
+use super::{Actuation, ChainPlant, Energy, PlantError, WideChainState, integration_steps};
 use crate::rig;
 
 /// A plant that can be simulated.
@@ -33,6 +34,13 @@ pub trait Plant: Send {
     /// (joint torques in N·m) held constant.
     fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize);
 
+    /// As [`advance`](Self::advance), with a force that changes within each step, in
+    /// [`steps`](Self::steps) steps.
+    fn advance_with(&mut self, actuation: &dyn Actuation, disturbances: &[f64], dt: f64, substeps: usize);
+
+    /// Number of integration steps in `dt` (s), at least `substeps`, that follow a motor with this damping (N·s/m).
+    fn steps(&self, damping_n_s_per_m: f64, dt: f64, substeps: usize) -> usize;
+
     /// Makes the cart's speed jump (m/s), and the links' rates with it: as by an impulse on the cart. A linear model
     /// has no cart, and stays as it is.
     fn set_cart_speed(&mut self, _speed: f64) {}
@@ -51,12 +59,22 @@ pub trait Plant: Send {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainSimulation<const N: usize> {
     /// The equations of motion.
-    pub plant: ChainPlant<N>,
+    plant: ChainPlant<N>,
     /// The current state, in absolute angles.
-    pub state: WideChainState<N>,
+    state: WideChainState<N>,
+    /// Largest acceleration of the cart per force (1/kg).
+    mobility: f64,
 }
 
 impl<const N: usize> ChainSimulation<N> {
+    /// The chain at rest with every link upright.
+    fn upright(plant: ChainPlant<N>) -> Self {
+        let state = WideChainState::upright();
+        // The cart is easiest to move where all links are vertical: then none has to be lifted.
+        let mobility = plant.derivative(&state, 1.0, &[0.0; N]).xdot;
+        Self { plant, state, mobility }
+    }
+
     fn check_length(&self, state: &[f64]) {
         assert_eq!(state.len(), self.states(), "a chain of {N} links has 2n + 2 states");
     }
@@ -105,6 +123,22 @@ impl<const N: usize> Plant for ChainSimulation<N> {
         for _ in 0..substeps {
             self.state = self.plant.rk4(&self.state, force, &torques, step);
         }
+    }
+
+    fn advance_with(&mut self, actuation: &dyn Actuation, disturbances: &[f64], dt: f64, substeps: usize) {
+        let torques = joint_torques(disturbances);
+        let steps = self.steps(actuation.damping_n_s_per_m(), dt, substeps);
+        let step_s = dt / steps as f64;
+        for step in 0..steps {
+            let inputs = actuation.inputs(step as f64 * step_s, step_s);
+            self.state = rk4(&self.state, step_s, |at, node| {
+                self.plant.derivative(at, actuation.force_n(inputs[node], at.xdot), &torques)
+            });
+        }
+    }
+
+    fn steps(&self, damping_n_s_per_m: f64, dt: f64, substeps: usize) -> usize {
+        integration_steps(damping_n_s_per_m * self.mobility, dt, substeps)
     }
 
     fn set_cart_speed(&mut self, speed: f64) {
@@ -159,8 +193,7 @@ pub fn chain_plant(chain: &rig::Chain) -> Result<Box<dyn Plant>, PlantError> {
         type Output = Result<Box<dyn Plant>, PlantError>;
 
         fn run<const N: usize>(self) -> Self::Output {
-            let plant = ChainPlant::<N>::of(self.0)?;
-            Ok(Box::new(ChainSimulation { plant, state: WideChainState::upright() }))
+            Ok(Box::new(ChainSimulation::<N>::upright(ChainPlant::of(self.0)?)))
         }
     }
     with_links(chain.links.len(), Ideal(chain))?

@@ -235,7 +235,7 @@ impl<const N: usize> Chains<N> {
                 &state,
                 dt,
                 #[inline(always)]
-                |at| model.derivative_inline(at, force, &torques),
+                |at, _| model.derivative_inline(at, force, &torques),
             );
         }
         state.x.store(&mut self.state.x, first);

@@ -10,8 +10,8 @@ use super::bristle::{Bristle, Contact};
 use super::parameters::real_chain;
 use crate::numerics::{Lu, Matrix};
 use crate::plant::{
-    ChainParameters, ChainPlant, Energy, Plant, PlantError, WideChainState, WithLinks, chain_plant,
-    with_links,
+    Actuation, ChainParameters, ChainPlant, Energy, Plant, PlantError, WideChainState, WithLinks,
+    chain_plant, integration_steps, with_links,
 };
 use crate::rig::{CartInput, Chain, Rig};
 
@@ -35,6 +35,8 @@ pub struct RealChain<const N: usize> {
     belt: Option<Belt>,
     slope: Slope<N>,
     longest_step_s: f64,
+    /// Largest acceleration of the motor per force (1/kg).
+    mobility: f64,
 }
 
 /// The moving parts: chain and rotor.
@@ -97,6 +99,7 @@ impl<const N: usize> RealChain<N> {
         if let Some(belt) = &belt {
             stiffness_per_mass += belt.stiffness * (mobility[0] + 1.0 / belt.rotor_kg);
         }
+        let of_motor = belt.as_ref().map_or(mobility[0], |belt| 1.0 / belt.rotor_kg);
         let rotor = Rotor { position: 0.0, speed: 0.0 };
         let mut machine = Self {
             plant: ChainPlant::new(&parameters)?,
@@ -108,6 +111,7 @@ impl<const N: usize> RealChain<N> {
             belt,
             slope,
             longest_step_s: LARGEST_PHASE / stiffness_per_mass.sqrt(),
+            mobility: of_motor,
         };
         machine.set_state(&vec![0.0; 2 * N + 2]);
         Ok(machine)
@@ -168,13 +172,20 @@ impl<const N: usize> RealChain<N> {
 
     /// One step of the classical Runge–Kutta method. The friction at a stage is a function of the travel since the
     /// start of the step, so that the bristles need no stages of their own.
-    fn step(&mut self, force: f64, torques: &[f64; N], dt: f64) {
+    ///
+    /// `force` (N) is a function of the stage's node (0: beginning of the step, 1: middle, 2: end) and of the speed of
+    /// the motor.
+    #[inline]
+    fn step(&mut self, force: impl Fn(usize, f64) -> f64, torques: &[f64; N], dt: f64) {
         let from = self.motion;
-        let rate = |at: &Motion<N>| self.derivative(&from, at, force, torques);
-        let k1 = rate(&from);
-        let k2 = rate(&from.plus(0.5 * dt, &k1));
-        let k3 = rate(&from.plus(0.5 * dt, &k2));
-        let k4 = rate(&from.plus(dt, &k3));
+        let rate = |at: &Motion<N>, node: usize| {
+            let speed = if self.belt.is_some() { at.rotor.speed } else { at.chain.xdot };
+            self.derivative(&from, at, force(node, speed), torques)
+        };
+        let k1 = rate(&from, 0);
+        let k2 = rate(&from.plus(0.5 * dt, &k1), 1);
+        let k3 = rate(&from.plus(0.5 * dt, &k2), 1);
+        let k4 = rate(&from.plus(dt, &k3), 2);
         let sum = k1.plus(2.0, &k2).plus(2.0, &k3).plus(1.0, &k4);
         let to = from.plus(dt / 6.0, &sum);
         if let Some(bristle) = &self.cart {
@@ -287,8 +298,24 @@ impl<const N: usize> Plant for RealChain<N> {
         let torques = core::array::from_fn(|j| disturbances[j]);
         let steps = (dt / self.longest_step_s).ceil().max(substeps.max(1) as f64);
         for _ in 0..steps as u64 {
-            self.step(force, &torques, dt / steps);
+            self.step(|_, _| force, &torques, dt / steps);
         }
+    }
+
+    fn advance_with(&mut self, actuation: &dyn Actuation, disturbances: &[f64], dt: f64, substeps: usize) {
+        assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
+        let torques = core::array::from_fn(|j| disturbances[j]);
+        let steps = self.steps(actuation.damping_n_s_per_m(), dt, substeps);
+        let step_s = dt / steps as f64;
+        for step in 0..steps {
+            let inputs = actuation.inputs(step as f64 * step_s, step_s);
+            self.step(|node, speed| actuation.force_n(inputs[node], speed), &torques, step_s);
+        }
+    }
+
+    fn steps(&self, damping_n_s_per_m: f64, dt: f64, substeps: usize) -> usize {
+        let for_contacts = (dt / self.longest_step_s).ceil() as usize;
+        integration_steps(damping_n_s_per_m * self.mobility, dt, substeps.max(for_contacts))
     }
 
     fn energy(&self) -> Option<Energy> {

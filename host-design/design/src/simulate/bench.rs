@@ -11,7 +11,7 @@ use super::error::SimulationError;
 use super::scenario::Scenario;
 use super::sensor::{SimulatedSensor, nearest};
 use super::servo::Servo;
-use crate::plant::{ChainLanes, LinearSimulation, MotorPlant, Plant};
+use crate::plant::{ChainLanes, LARGEST_SHARE, LinearSimulation, MOST_STEPS, Plant};
 use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
 use crate::rig::{Chain, PlantDescription, Rig};
 
@@ -29,7 +29,6 @@ pub enum StepDefect {
 /// The simulated rig: everything outside the controller.
 pub struct Bench {
     plant: Box<dyn Plant>,
-    motor: Option<MotorPlant>,
     /// Travel per pulse (m) of a drive that imposes the cart's motion.
     step_m: Option<f64>,
     /// Its pulses so far, from position 0.
@@ -42,6 +41,7 @@ pub struct Bench {
     step_motor: Option<StepMotor>,
     /// A servo that follows late.
     servo: Option<Servo>,
+    /// Motor and driver, unless the force is the commanded one.
     driver: Option<Driver>,
     timing: Timing,
     encoders: Option<RealEncoders>,
@@ -78,6 +78,7 @@ impl Bench {
             PlantDescription::Model(model) => Box::new(LinearSimulation::of(model)),
         };
         plant.set_state(&scenario.start);
+        can_be_followed(rig, plant.as_ref())?;
         let noise = |level: f64| {
             if level.is_finite() && level >= 0.0 { Ok(level) } else { Err(SimulationError::Noise(level)) }
         };
@@ -89,7 +90,6 @@ impl Bench {
             torques: vec![0.0; plant.disturbances()],
             pull_n_m: vec![0.0; plant.disturbances()],
             plant,
-            motor: rig.actuator.motor.as_ref().map(MotorPlant::of),
             step_m,
             pulses: pulses_at(&scenario.start, step_m, servo.as_ref()),
             missed: 0,
@@ -323,8 +323,7 @@ impl Bench {
     pub(super) fn lockstep_chain(rig: &Rig) -> Option<Chain> {
         let chain = rig.chain()?;
         let driver = &rig.reality.driver;
-        let is_simple = rig.actuator.motor.is_none()
-            && rig.actuator.acceleration.is_none()
+        let is_simple = rig.actuator.acceleration.is_none()
             && Driver::of(rig).is_none()
             && driver.latency_s == 0.0
             && driver.jitter_s == 0.0;
@@ -334,7 +333,7 @@ impl Bench {
     /// Begins a tick in lockstep: puts force and torques into a lane, and returns the motor's force (N).
     pub(super) fn push_lane(&mut self, drive: Drive, lanes: &mut dyn ChainLanes, lane: usize) -> f64 {
         let (now, disturbance) = self.begin(drive);
-        let force = self.force(now, self.period_s);
+        let force = commanded_n(now);
         lanes.push(lane, force + disturbance, &self.torques);
         force
     }
@@ -353,18 +352,25 @@ impl Bench {
     /// at its start (N).
     fn advance(&mut self, drive: Drive, disturbance: f64, length_s: f64) -> f64 {
         let substeps = self.substeps_in(length_s);
-        let step = length_s / substeps as f64;
-        // Within the tick, the back-EMF follows the speed and the driver follows the command, so the force changes.
-        let changes = self.driver.is_some() || matches!((&self.motor, drive), (Some(_), Drive::Duty(_)));
-        let (pieces, piece, substeps) = if changes { (substeps, step, 1) } else { (1, length_s, substeps) };
-        let mut at_start = None;
-        for _ in 0..pieces {
-            let force = self.force(drive, piece);
-            at_start.get_or_insert(force);
-            self.plant.advance(force + disturbance, &self.torques, piece, substeps);
+        let speed = self.motor_speed();
+        let Some(driver) = &mut self.driver else {
+            let force = commanded_n(drive);
+            self.plant.advance(force + disturbance, &self.torques, length_s, substeps);
             self.plant.write_state(&mut self.state);
-        }
-        at_start.unwrap_or_default()
+            return force;
+        };
+        let acting = driver.acting(drive, disturbance);
+        let at_start = acting.first_n(speed);
+        self.plant.advance_with(&acting, &self.torques, length_s, substeps);
+        self.plant.write_state(&mut self.state);
+        let speed = self.motor_speed();
+        self.driver.iter_mut().for_each(|driver| driver.finish(drive, length_s, speed));
+        at_start
+    }
+
+    /// Speed of the motor, converted to speed of the cart (m/s).
+    fn motor_speed(&self) -> f64 {
+        self.plant.motor_speed().or(self.state.get(1).copied()).unwrap_or_default()
     }
 
     /// Number of integration steps in a part of a tick, in proportion to its length (s).
@@ -374,16 +380,28 @@ impl Bench {
         }
         (self.substeps as f64 * length_s / self.period_s).ceil().max(1.0) as usize
     }
+}
 
-    /// Mean force of the motor on the cart in the next `dt` (s).
-    fn force(&mut self, drive: Drive, dt: f64) -> f64 {
-        let speed = self.plant.motor_speed().or(self.state.get(1).copied()).unwrap_or_default();
-        match (&mut self.driver, drive, &self.motor) {
-            (Some(driver), _, motor) => driver.force(drive, motor.as_ref(), speed, dt),
-            (None, Drive::Force(force), _) => f64::from(force),
-            (None, Drive::Duty(duty), Some(motor)) => motor.force(f64::from(duty), speed),
-            (None, Drive::Duty(_), None) | (None, Drive::Steps(_), _) => 0.0,
-        }
+/// Checks that a motor's speed can be followed within a tick.
+fn can_be_followed(rig: &Rig, plant: &dyn Plant) -> Result<(), SimulationError> {
+    let Some(motor) = &rig.actuator.motor else { return Ok(()) };
+    let (period_s, damping) = (rig.tick.period_s, motor.braking_n_s_per_m());
+    let steps = plant.steps(damping, period_s, 1);
+    if steps <= MOST_STEPS {
+        return Ok(());
+    }
+    Err(SimulationError::StiffMotor {
+        within_s: period_s / (LARGEST_SHARE * steps as f64),
+        period_s,
+        speed_m_per_s: motor.supply_v / motor.volts_per_speed(),
+    })
+}
+
+/// Force on the cart (N) of a drive without a motor, which produces the commanded one.
+fn commanded_n(drive: Drive) -> f64 {
+    match drive {
+        Drive::Force(force) => f64::from(force),
+        Drive::Duty(_) | Drive::Steps(_) => 0.0,
     }
 }
 

@@ -26,6 +26,19 @@ pub enum SimulationError {
     /// A disturbing force that is not finite.
     #[error("a constant force of {0} N is not possible: give a finite number")]
     Offset(f64),
+    /// A motor that stops the cart far too fast.
+    #[error(
+        "the back-EMF of the motor stops the cart within {within_s:.1e} s, a tick has {period_s} s; without load, the motor \
+         moves it at no more than {speed_m_per_s:.1e} m/s: check gear_ratio, pulley_radius_m and resistance_ohm"
+    )]
+    StiffMotor {
+        /// Time constant of the cart with the motor's terminals held at a voltage (s).
+        within_s: f64,
+        /// Control period (s).
+        period_s: f64,
+        /// Speed of the cart without load at full supply (m/s).
+        speed_m_per_s: f64,
+    },
     /// A run with the whole state measured, of a drive that counts its own pulses.
     #[error(
         "with kind = \"acceleration\", all that the controller knows of the cart is its own pulses, so it cannot measure \

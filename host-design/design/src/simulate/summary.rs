@@ -7,6 +7,7 @@ use upright::supervision::fault::Fault;
 
 use super::scenario::Scenario;
 use super::trace::Trace;
+use crate::number::significant;
 use crate::plant::absolute_angles;
 use crate::rig::{CartInput, PlantDescription, Rig};
 
@@ -83,12 +84,18 @@ impl fmt::Display for FallKind {
     }
 }
 
+/// Share of the speed at which a motor has voltage left from which on it counts as reached.
+const SPENT: f64 = 0.9;
+
 /// Figures of one run. The settling band is 2 % of the step around the set-point, and at least 1 mm (of the output, for
 /// a model).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// The loss of balance, if there was one.
     pub fall: Option<Fall>,
+    /// Largest speed at which the motor has voltage left (m/s), if the cart ran at it before the fall.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub out_of_volts_m_per_s: Option<f64>,
     /// Whether the output is within the settling band when the run ends.
     pub settled: bool,
     /// Time after the step from which the run stays settled (s).
@@ -127,12 +134,13 @@ impl Summary {
         let mut peak_angles_rad = angles(&scenario.start);
         let (mut peak_force_n, mut peak_requested_force_n) = (0.0f64, 0.0f64);
         let (mut beyond, mut against) = (0.0f64, 0.0f64);
-        let (mut last_outside, mut final_error_m) = (None, 0.0);
+        let (mut last_outside, mut final_error_m, mut fastest) = (None, 0.0, 0.0f64);
         for sample in trace.samples() {
             let lean = angles(sample.state);
             for (peak, angle) in peak_angles_rad.iter_mut().zip(&lean) {
                 *peak = peak.max(*angle);
             }
+            fastest = fastest.max(sample.state.get(1).map_or(0.0, |speed| speed.abs()));
             peak_force_n = peak_force_n.max(sample.force.abs());
             peak_requested_force_n = peak_requested_force_n.max(sample.requested.abs());
             let y = sample.state[output];
@@ -151,8 +159,11 @@ impl Summary {
         let settling_time_s = settled
             .then(|| last_outside.map_or(0.0, |t| (t + rig.tick.period_s - scenario.step_at_s).max(0.0)));
         let percent = |excursion: f64| (step != 0.0).then(|| 100.0 * excursion / step.abs());
+        let motor = rig.actuator.motor.as_ref().filter(|_| fall.is_some());
+        let reach = motor.map(|motor| (motor.supply_v - motor.dead_zone_v) / motor.volts_per_speed());
         Self {
             fall,
+            out_of_volts_m_per_s: reach.filter(|reach| fastest >= SPENT * reach),
             settled,
             settling_time_s,
             overshoot_percent: percent(beyond),
@@ -165,6 +176,16 @@ impl Summary {
         }
     }
 
+    /// The fall, and what the motor has to do with it.
+    pub fn fall_in_words(&self) -> Option<String> {
+        let fall = self.fall.as_ref()?;
+        let Some(reach) = self.out_of_volts_m_per_s else { return Some(fall.to_string()) };
+        Some(format!(
+            "{fall}: the motor has no voltage left at {} m/s (a smaller gear_ratio, a larger pulley or supply_v make it faster)",
+            significant(reach, 3)
+        ))
+    }
+
     /// Whether the rig is still up at the end of the run.
     pub fn survives(&self) -> bool {
         self.fall.is_none()
@@ -173,7 +194,7 @@ impl Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.fall, self.settling_time_s) {
+        match (self.fall_in_words(), self.settling_time_s) {
             (Some(fall), _) => writeln!(f, "FALLS: {fall}")?,
             (None, Some(time)) => writeln!(f, "survives, settled after {time:.3} s")?,
             (None, None) => writeln!(f, "survives, not settled when the run ends")?,

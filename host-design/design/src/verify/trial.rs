@@ -251,12 +251,10 @@ fn largest_angle(rig: &Rig, state: &[f64]) -> f64 {
 }
 
 /// The rig's run at rest for `duration_s`, with integration steps of at most 1 ms: on the fastest rig a run then
-/// differs from one with steps of 0.25 ms by less than 1e-6. With a motor the steps are finer, because the back-EMF is
-/// held in each.
+/// differs from one with steps of 0.25 ms by less than 1e-6.
 pub(crate) fn scenario(rig: &Rig, law: Law, duration_s: f64) -> Scenario {
     let steps = (rig.tick.period_s / 1e-3 - 1e-9).ceil().clamp(1.0, 1e4) as usize;
-    let finer = if rig.actuator.motor.is_some() { 2 } else { 1 };
-    Scenario { duration_s, substeps: finer * steps, ..Scenario::at_rest(rig, law) }
+    Scenario { duration_s, substeps: steps, ..Scenario::at_rest(rig, law) }
 }
 
 /// [`scenario`] with disturbances, as the firmware runs it: it ends where the motor is turned off.

@@ -14,6 +14,7 @@ mod identify_coverage;
 mod identify_stepper;
 mod known_friction;
 mod lockstep;
+mod motor;
 mod plant_equations;
 mod plant_linear_model;
 mod plant_linearisation;

@@ -78,6 +78,7 @@ impl<'a> Commissioning<'a> {
             match result {
                 Ok(()) => next += 1,
                 Err(Stop::Machine(_)) if guide.machine.again(step, back) => {
+                    guide.journal.again(back);
                     next = steps.iter().position(|&one| one == back).unwrap_or(next);
                 }
                 Err(stop) => return Err(stop),

@@ -156,12 +156,21 @@ impl Journal {
         self.write()
     }
 
-    /// Completes the record: every step was passed.
+    /// Shows that the steps are done again from `back` on.
+    pub fn again(&mut self, back: CommissionStep) {
+        (self.show)(&format!("begins again: {}", back.name()));
+    }
+
+    /// Completes the record: every step was passed. Shows those that were not at first.
     ///
     /// # Errors
     /// [`WriteError`] if the record cannot be written.
     pub fn done(&mut self) -> Result<(), WriteError> {
         self.record.outcome = CommissionOutcome::Done;
+        for step in self.record.steps.iter().filter(|step| !step.passed) {
+            let why = step.stopped.as_deref().unwrap_or_default();
+            (self.show)(&format!("{} had to begin again: {why}", step.step.name()));
+        }
         self.write()
     }
 

@@ -348,3 +348,26 @@ fn the_command_ends_with_status_3_if_the_machine_must_not_be_run() {
         assert!(stderr(&output).contains(words), "{}", stderr(&output));
     }
 }
+
+#[test]
+fn a_commissioning_that_began_again_says_so_at_its_end() {
+    use std::sync::{Arc, Mutex};
+    let shown = Arc::new(Mutex::new(Vec::new()));
+    let lines = Arc::clone(&shown);
+    let rig = Rig::from_path(Path::new(&path_of(SINGLE))).unwrap();
+    let show = Box::new(move |line: &str| lines.lock().unwrap().push(line.to_owned()));
+    let mut journal = Journal::new(CommissionRecord::new(&rig, "this computer"), None, show);
+    for stopped in [Some("fault rail"), None] {
+        journal.begin(CommissionStep::Excitation);
+        journal.end(stopped.map(str::to_owned)).unwrap();
+        if stopped.is_some() {
+            journal.again(CommissionStep::Homing);
+        }
+    }
+    let before = shown.lock().unwrap().clone();
+    journal.done().unwrap();
+    let shown = shown.lock().unwrap();
+    assert!(before.contains(&"begins again: homing".to_owned()), "{before:?}");
+    assert_eq!(shown[before.len()..], ["excitation had to begin again: fault rail".to_owned()]);
+    assert_eq!(journal.record.steps.len(), 2);
+}

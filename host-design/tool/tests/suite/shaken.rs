@@ -25,7 +25,7 @@ use upright_tool::image::ImageKind;
 use upright_tool::in_the_loop::{PinLink, RunPlace, run_shaken};
 
 use crate::equipment::{built_for, in_qemu};
-use crate::published::{rig_and_table, rig_and_table_with_motions};
+use crate::published::{first_hour, rig, rig_and_table, rig_and_table_with_motions};
 
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
     homing_error_rad = [0.006, -0.004]\nrail_tilt_rad = 0.003\nlatency_s = 4e-4\ncart_mass_percent = 8\n\
@@ -212,6 +212,51 @@ fn a_silent_host_and_the_stop_key_end_it() {
         (100..5_200).contains(&on) && (state, fault) == (State::Calibrated, None),
         "{on} {state:?} {fault:?}"
     );
+}
+
+/// Whether the firmware shakes the machine of `rig` to the end, with forces for the rig `file`.
+fn is_shaken_to_the_end(rig: &Rig, file: &Rig, seconds: f64, seed: u64) -> bool {
+    let table = crate::published::table(rig);
+    let feed = Feed::new(file, &table, seconds, seed).unwrap();
+    let outcome = with_firmware(&table, |target| {
+        let mut shaken = Shaken::begin_with(feed, rig, &table, target, seed).unwrap();
+        while !shaken.is_over() && shaken.harness.session.fault().is_none() {
+            shaken.tick(|_| (), |drive| drive).unwrap();
+        }
+        shaken.harness.session.fault().is_none()
+    });
+    outcome.unwrap()
+}
+
+/// The carts of these seeds ran into the limits of the rail while the amplitude was that of the first 20 s, and rose
+/// after every interval in which the links moved little.
+#[test]
+fn a_machine_is_shaken_for_as_long_as_it_is_asked_to() {
+    let rigs = [rig("single-quanser-ip02"), first_hour(6.3)];
+    for (rig, seconds, seed) in
+        [(&rigs[0], 20.0, 2), (&rigs[0], 60.0, 3), (&rigs[1], 40.0, 1), (&rigs[1], 60.0, 2)]
+    {
+        assert!(is_shaken_to_the_end(rig, rig, seconds, seed), "{}, {seconds} s, seed {seed}", rig.name);
+    }
+    // Negative control: forces for a rail that is twice as long.
+    let mut longer = rigs[0].clone();
+    longer.chain_mut().unwrap().cart.travel_m = [-0.8, 0.8];
+    assert!(!is_shaken_to_the_end(&rigs[0], &longer, 20.0, 2));
+}
+
+/// Before the motor's force followed its speed within a tick, 0.985 kg were found.
+#[test]
+fn the_rig_of_the_first_hour_is_found_to_weigh_what_its_file_says() {
+    let rig = first_hour(6.3);
+    let table = crate::published::table(&rig);
+    for seed in [1, 2] {
+        let log = run_shaken(&rig, &table, 20.0, seed, RunPlace::Host).unwrap();
+        let settings = Settings { trust_wiring: true, ..Settings::default() };
+        let found = identify(&rig, &[(PathBuf::from("run.log"), log)], &settings, &|_| ()).unwrap();
+        let mass = found.estimate(ParameterKind::TotalMass).unwrap();
+        let off = (mass.new - rig.chain().unwrap().total_mass_kg()) / mass.deviation;
+        assert!(off.abs() < 2.5 && mass.deviation < 2e-3, "seed {seed}: {mass:?}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use clap::Args;
 use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, SimulationError, simulate};
+use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::swing_up::{Stored, SwingUpError};
 use upright_design::table::{Gains, TableValues, gains_source, identity_differences, write_atomically};
 use upright_tool::image::BoardName;
@@ -152,7 +152,7 @@ fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure>
                 rig.name, assessment.rounded, rig.tick.period_s
             )));
         }
-        if let Some(fall) = run.as_ref().and_then(|run| run.fall.as_ref()) {
+        if let Some(fall) = run.as_ref().and_then(Summary::fall_in_words) {
             return Err(Failure::check(format!(
                 "{}: {law}: {fall} in the closed loop with the new table. Nothing was written",
                 rig.name

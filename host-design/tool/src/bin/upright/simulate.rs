@@ -132,7 +132,7 @@ impl SimulateCommand {
         let (rig, table, scenario) = self.prepared()?;
         let (trace, summary) = run(&rig, &table, &scenario)?;
         self.write(&rig, &trace, &summary)?;
-        match &summary.fall {
+        match summary.fall_in_words() {
             Some(fall) => Err(Failure::check(format!("{}: {fall}", rig.name))),
             None => Ok(()),
         }

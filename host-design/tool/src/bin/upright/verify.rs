@@ -189,7 +189,7 @@ impl VerifyCommand {
             write_atomically(path, &bytes)?;
         }
         print(self.json, &summary, || format!("{}\n{summary}\n", plant.describe()))?;
-        match &summary.fall {
+        match summary.fall_in_words() {
             Some(fall) => Err(Failure::check(format!("{}, seed {seed}: {fall}", rig.name))),
             None => Ok(()),
         }
