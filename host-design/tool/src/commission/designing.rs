@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use upright::table::Law;
 use upright_design::design::{Certified, design};
-use upright_design::identify::{Estimate, Identification, Log, ParameterKind, Settings, identify};
+use upright_design::identify::{
+    Estimate, Identification, Log, ParameterKind, Settings, identify, rig_file,
+};
 use upright_design::number::significant;
 use upright_design::rig::{Rig, RigText, Tolerances};
 use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
@@ -15,7 +17,7 @@ use upright_design::verify::{VerifyError, brief};
 use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::record::Journal;
-use crate::identified::{json, rig_file, text};
+use crate::identified::{json, text};
 
 /// Duration of the runs that the gains have to survive (s).
 const RUN_S: f64 = 10.0;

@@ -4,10 +4,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings};
+use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings, rig_file};
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
-use upright_tool::identified::{json, page, rig_file, text};
+use upright_tool::identified::{json, page, text};
 
 use crate::failure::Failure;
 use crate::progress::with_progress;

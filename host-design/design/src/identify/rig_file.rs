@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use upright_design::identify::{Identification, Realised, RealisedLink};
-use upright_design::number::rounded;
-use upright_design::rig::{MEASUREMENTS_OF_A_LINK, Rig, RigError, RigText};
+use super::estimated::Identification;
+use super::realise::{Realised, RealisedLink};
+use crate::number::rounded;
+use crate::rig::{MEASUREMENTS_OF_A_LINK, Rig, RigError, RigText};
 
 /// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
 const WITHIN: [&str; 5] = [
@@ -94,8 +95,8 @@ fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, Strin
 
 #[cfg(test)]
 mod tests {
+    use super::super::realise::RealisedCart;
     use super::*;
-    use upright_design::identify::RealisedCart;
 
     /// An identification that found nothing new.
     const NOTHING: Identification = Identification {
