@@ -47,7 +47,9 @@ fn widening(kind: ParameterKind) -> Widening {
         | ParameterKind::Presliding(_)
         | ParameterKind::Travel
         | ParameterKind::EccentricSine(_)
-        | ParameterKind::EccentricCosine(_) => [1.0, 0.0],
+        | ParameterKind::EccentricCosine(_)
+        | ParameterKind::TwiceSine(_)
+        | ParameterKind::TwiceCosine(_) => [1.0, 0.0],
     };
     Widening { of_change, least }
 }

@@ -87,7 +87,9 @@ impl CoveredQuantity {
             | ParameterKind::Presliding(_)
             | ParameterKind::Travel
             | ParameterKind::EccentricSine(_)
-            | ParameterKind::EccentricCosine(_) => return None,
+            | ParameterKind::EccentricCosine(_)
+        | ParameterKind::TwiceSine(_)
+        | ParameterKind::TwiceCosine(_) => return None,
         })
     }
 

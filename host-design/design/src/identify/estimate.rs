@@ -14,7 +14,7 @@ use super::imposed;
 use super::log::Log;
 use super::model::Model;
 use super::old_values::old_values;
-use super::parameters::{Layout, ParameterKind, Prior, priors};
+use super::parameters::{Layout, ParameterKind, Prior, for_wiring, priors};
 use super::prediction::Filter;
 use super::realise::realise;
 use super::record::Record;
@@ -109,7 +109,7 @@ pub fn identify_recordings(
         free::known(rig, model.layout, &mut priors, record.is_clamped);
     }
     if is_driven && !settings.trust_wiring {
-        let wiring = wiring::find(&model, &record, &priors, progress);
+        let wiring = wiring::find(&model, &record, &for_wiring(model.layout, &priors), progress);
         found.wiring = Some(wiring.clone());
         if !wiring.is_as_in_file() {
             found.refusal = Some(Refusal::Wiring(wiring));

@@ -30,11 +30,6 @@ const WINDOW_S: f64 = 0.5;
 const ITERATIONS: (usize, usize) = (12, 3);
 /// Number of parts, each of which is left out once.
 const PARTS: usize = 5;
-/// Drag of a link as a multiple of its moment of inertia (1/rad²): measured ones are 0.004 to 0.006.
-const USUAL_DRAG: f64 = 0.005;
-/// Prior deviation of a drag, as a multiple of the usual one.
-const DRAG: f64 = 10.0;
-
 /// Prior deviation of a presliding, as a multiple of the usual one.
 const PRESLIDING: f64 = 2.0;
 /// Least difference between the halves, in its deviations, that is named.
@@ -100,19 +95,16 @@ impl FreeFit {
     }
 }
 
-/// Fixes what free swings do not show at the values of the file, and frees the drag of the links and the presliding of
-/// the joints.
+/// Fixes what free swings do not show at the values of the file, and frees the presliding of the joints.
 pub(super) fn known(rig: &Rig, layout: Layout, priors: &mut [Prior], is_clamped: bool) {
     let mut fixed = vec![layout.first_moment(layout.links - 1), layout.delay(), layout.dead_zone()];
     if is_clamped {
-        fixed.extend([Layout::TOTAL_MASS, layout.viscous(0), layout.dry(0), layout.tilt()]);
+        fixed.extend([Layout::TOTAL_MASS, layout.viscous(0), layout.dry(0), layout.tilt(), layout.travel()]);
         priors[layout.dry(0)].value = rig.reality.friction.cart_friction_n;
         priors[layout.tilt()].value = rig.reality.sensors.rail_tilt_rad;
     }
     fixed.into_iter().for_each(|index| priors[index].deviation = 0.0);
     for link in 0..layout.links {
-        let usual = USUAL_DRAG * priors[layout.second_moment(link)].value;
-        priors[layout.drag(link)].deviation = DRAG * usual;
         let presliding = &mut priors[layout.presliding(link)];
         presliding.deviation = PRESLIDING * presliding.value;
     }

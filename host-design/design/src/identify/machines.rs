@@ -174,7 +174,9 @@ fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
         ParameterKind::Presliding(_)
         | ParameterKind::Travel
         | ParameterKind::EccentricSine(_)
-        | ParameterKind::EccentricCosine(_) => None,
+        | ParameterKind::EccentricCosine(_)
+        | ParameterKind::TwiceSine(_)
+        | ParameterKind::TwiceCosine(_) => None,
     };
     let kinds = Layout { links: real.links.len() }.kinds();
     Ok(kinds.into_iter().filter_map(|kind| Some((kind, value(kind)?))).collect())
