@@ -22,7 +22,8 @@
 //!    squared innovations divided by their variances (Gauss–Newton).
 //! 4. Deviations: from the normal equations, widened by a share of the change that other models of the dry friction and
 //!    finer sampling cause.
-//! 5. Verdict: the last 10 s (of a short log, a quarter) are held out of the fit, and predicted in windows of 0.5 s.
+//! 5. Verdict: the last 10 s (of a short log, a quarter) are held out of the fit, and predicted in windows of 0.5 s
+//!    with the new rig file, which is read again for that.
 //!
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
@@ -61,12 +62,13 @@ mod rows;
 mod shooting;
 mod step;
 mod stribeck;
+mod suspect;
 mod table;
-mod travel;
 mod verdict;
 mod window_errors;
 mod wiring;
 mod with_firmware;
+mod written;
 
 pub use coverage::{
     Coverage, CoverageError, CoverageRow, CoveredQuantity, Drawn, Identified, Missed, coverage, identified,

@@ -37,8 +37,8 @@ pub enum ParameterKind {
     Delay,
     /// Dead zone of the motor (V).
     DeadZone,
-    /// Travel of the cart per count of its sensor, or per step of a drive that imposes its motion, as a multiple of that
-    /// of the file.
+    /// Travel of the cart per count of its sensor, or per step of a drive that imposes its motion, as a multiple of
+    /// that of the file.
     Travel,
     /// Zero error of a joint's encoder (rad).
     Zero(usize),
@@ -68,6 +68,11 @@ impl ParameterKind {
                 | ParameterKind::JointDry(_)
                 | ParameterKind::AirDrag(_)
         )
+    }
+
+    /// Whether it is a mass or a friction of the cart.
+    pub(super) fn is_of_cart(self) -> bool {
+        matches!(self, ParameterKind::TotalMass | ParameterKind::CartViscous | ParameterKind::CartDry)
     }
 
     /// Name, with links and joints counted from 1, and SI unit.
@@ -310,7 +315,7 @@ pub(super) fn for_wiring(layout: Layout, priors: &[Prior]) -> Vec<Prior> {
 
 /// Part of the file's error of a joint's sensor once (0) or twice (1) per turn (rad): `part` is the cosine of its phase
 /// for the sine of the angle, and the sine for the cosine.
-fn periodic(sensors: &SensorErrors, joint: usize, harmonic: usize, part: fn(f64) -> f64) -> f64 {
+pub(super) fn periodic(sensors: &SensorErrors, joint: usize, harmonic: usize, part: fn(f64) -> f64) -> f64 {
     let [amplitude_rad, phase_rad] = match harmonic {
         0 => [&sensors.eccentricity_rad, &sensors.eccentricity_phase_rad],
         _ => [&sensors.twice_per_turn_rad, &sensors.twice_per_turn_phase_rad],

@@ -190,9 +190,9 @@ pub(super) struct Measured {
 }
 
 impl Model {
-    /// What channel `channel` measures at `state`: for the cart its position over the travel per count, as a multiple of
-    /// that of the file; for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`, with θ from the vertical and h
-    /// the hanging angle, and the same of twice the angle.
+    /// What channel `channel` measures at `state`: for the cart its position over the travel per count, as a multiple
+    /// of that of the file; for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`, with θ from the vertical
+    /// and h the hanging angle, and the same of twice the angle.
     pub(super) fn measure(&self, p: &[f64], state: &[f64], channel: usize) -> Measured {
         let layout = self.layout;
         let Some(joint) = channel.checked_sub(1) else {

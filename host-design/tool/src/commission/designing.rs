@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use upright::table::Law;
 use upright_design::design::{Certified, design};
 use upright_design::identify::{
-    Estimate, Identification, Log, ParameterKind, Settings, identify, rig_file,
+    Estimate, Identification, Log, ParameterKind, Recordings, Settings, identify_recordings, rig_file,
 };
 use upright_design::number::significant;
 use upright_design::rig::{Rig, RigText, Tolerances};
@@ -56,15 +56,13 @@ pub(super) fn identified(
     log: &Log,
 ) -> Result<Identification, Stop> {
     let settings = Settings::default();
-    let logs = [(PathBuf::from("the log"), log.clone())];
-    let found =
-        identify(plan.rig, &logs, &settings, &|_| ()).map_err(|error| Stop::Machine(error.to_string()))?;
+    let logs = Recordings::Logs(vec![(PathBuf::from("the log"), log.clone())]);
+    let found = identify_recordings(plan.rig, Some(plan.text), &logs, None, &settings, &|_| ())
+        .map_err(|error| Stop::Machine(error.to_string()))?;
     text(&plan.rig.name, &found, &settings).lines().for_each(|line| journal.found(line));
     journal.data(json(&plan.rig.name, &found));
-    match &found.refusal {
-        None => Ok(found),
-        Some(refusal) => Err(Stop::Machine(refusal.to_string())),
-    }
+    let reason = found.refusal.as_ref().map(ToString::to_string).or(found.doubted().map(ToString::to_string));
+    reason.map_or(Ok(found), |reason| Err(Stop::Machine(reason)))
 }
 
 /// The rig file with the numbers that were found, and gains for them.
