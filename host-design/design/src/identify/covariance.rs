@@ -43,11 +43,13 @@ fn widening(kind: ParameterKind) -> Widening {
         ParameterKind::Delay => [0.5, 8e-3],
         ParameterKind::DeadZone => [0.65, 0.0],
         ParameterKind::Zero(_) => [0.35, 7e-3],
+        ParameterKind::Travel => [1.0, 4e-4],
         ParameterKind::AirDrag(_)
         | ParameterKind::Presliding(_)
-        | ParameterKind::Travel
         | ParameterKind::EccentricSine(_)
-        | ParameterKind::EccentricCosine(_) => [1.0, 0.0],
+        | ParameterKind::EccentricCosine(_)
+        | ParameterKind::TwiceSine(_)
+        | ParameterKind::TwiceCosine(_) => [1.0, 0.0],
     };
     Widening { of_change, least }
 }

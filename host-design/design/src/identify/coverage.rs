@@ -9,6 +9,7 @@ use super::error::IdentifyError;
 use super::estimate::{Settings, identify};
 use super::estimated::Identification;
 use super::excite::shake_machine;
+use super::log::{DriveScale, Log};
 use super::machines::{DrawnMachine, TrueFriction};
 use super::parameters::ParameterKind;
 use crate::rig::Rig;
@@ -40,10 +41,14 @@ pub enum CoveredQuantity {
     JointViscous,
     CartDry,
     JointDry,
+    AirDrag,
     DeadZone,
     Tilt,
     Delay,
+    Travel,
     Zero,
+    SensorOnce,
+    SensorTwice,
     Shape,
     Scale,
 }
@@ -51,7 +56,7 @@ pub enum CoveredQuantity {
 impl CoveredQuantity {
     /// Every quantity with its name, the unit in which its error is shown, and the factor that converts
     /// [`Missed::error`] to that unit.
-    pub const ALL: [(CoveredQuantity, &str, &str, f64); 13] = {
+    pub const ALL: [(CoveredQuantity, &str, &str, f64); 17] = {
         let degrees = 180.0 / core::f64::consts::PI;
         [
             (CoveredQuantity::Length, "lengths", "%", 100.0),
@@ -61,10 +66,14 @@ impl CoveredQuantity {
             (CoveredQuantity::JointViscous, "viscous friction, joints", "%", 100.0),
             (CoveredQuantity::CartDry, "dry friction, cart", "%", 100.0),
             (CoveredQuantity::JointDry, "dry friction, joints", "%", 100.0),
+            (CoveredQuantity::AirDrag, "air drag", "%", 100.0),
             (CoveredQuantity::DeadZone, "dead zone", "%", 100.0),
             (CoveredQuantity::Tilt, "tilt", "°", degrees),
             (CoveredQuantity::Delay, "delay", "ticks", 1.0),
+            (CoveredQuantity::Travel, "travel per count, cart", "%", 100.0),
             (CoveredQuantity::Zero, "zeros", "°", degrees),
+            (CoveredQuantity::SensorOnce, "sensors, once per turn", "°", degrees),
+            (CoveredQuantity::SensorTwice, "sensors, twice per turn", "°", degrees),
             (CoveredQuantity::Shape, "shape: lengths, a/a_n, J/a_n", "%", 100.0),
             (CoveredQuantity::Scale, "scale: a_n", "%", 100.0),
         ]
@@ -83,16 +92,16 @@ impl CoveredQuantity {
             ParameterKind::Tilt => Self::Tilt,
             ParameterKind::Delay => Self::Delay,
             ParameterKind::Zero(_) => Self::Zero,
-            ParameterKind::AirDrag(_)
-            | ParameterKind::Presliding(_)
-            | ParameterKind::Travel
-            | ParameterKind::EccentricSine(_)
-            | ParameterKind::EccentricCosine(_) => return None,
+            ParameterKind::AirDrag(_) => Self::AirDrag,
+            ParameterKind::Travel => Self::Travel,
+            ParameterKind::EccentricSine(_) | ParameterKind::EccentricCosine(_) => Self::SensorOnce,
+            ParameterKind::TwiceSine(_) | ParameterKind::TwiceCosine(_) => Self::SensorTwice,
+            ParameterKind::Presliding(_) => return None,
         })
     }
 
     fn is_absolute(self) -> bool {
-        matches!(self, Self::Tilt | Self::Delay | Self::Zero)
+        matches!(self, Self::Tilt | Self::Delay | Self::Zero | Self::SensorOnce | Self::SensorTwice)
     }
 }
 
@@ -107,6 +116,13 @@ pub struct Missed {
     pub deviation: Option<f64>,
 }
 
+impl Missed {
+    /// Absolute error in stated deviations.
+    fn in_deviations(&self) -> Option<f64> {
+        self.deviation.map(|deviation| self.error.abs() / deviation)
+    }
+}
+
 /// Result for one machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identified {
@@ -114,6 +130,8 @@ pub struct Identified {
     pub number: u64,
     /// Why no rig file would be written; none if one would be.
     pub refused: Option<String>,
+    /// Why one would be written only on trust.
+    pub doubted: Option<String>,
     /// Error of each number, even if no rig file would be written.
     pub missed: Vec<Missed>,
 }
@@ -135,6 +153,8 @@ pub struct CoverageRow {
     pub rms: f64,
     /// Largest absolute error.
     pub worst: f64,
+    /// Largest error in its own stated deviations; none if the quantity has no intervals.
+    pub furthest: Option<f64>,
     /// Root mean square of the stated deviations; none if the quantity has no intervals.
     pub stated: Option<f64>,
 }
@@ -146,6 +166,8 @@ pub struct Coverage {
     pub machines: usize,
     /// Numbers of the machines for which no rig file would be written, and why.
     pub refused: Vec<(u64, String)>,
+    /// The same of those for which one would be written only on trust.
+    pub doubted: Vec<(u64, String)>,
     /// One row for each quantity that the rig has.
     pub rows: Vec<CoverageRow>,
 }
@@ -200,12 +222,15 @@ pub fn coverage(
             covered: has_interval.then(|| of.iter().filter(covers).count()),
             rms: rms(&mut of.iter().map(|missed| missed.error)),
             worst: factor * of.iter().map(|missed| missed.error.abs()).fold(0.0, f64::max),
+            furthest: has_interval
+                .then(|| of.iter().filter_map(|missed| missed.in_deviations()).fold(0.0, f64::max)),
             stated: has_interval.then(|| rms(&mut of.iter().filter_map(|missed| missed.deviation))),
         })
     };
     Ok(Coverage {
         machines: all.len(),
         refused: all.iter().filter_map(|one| Some((one.number, one.refused.clone()?))).collect(),
+        doubted: all.iter().filter_map(|one| Some((one.number, one.doubted.clone()?))).collect(),
         rows: CoveredQuantity::ALL.into_iter().filter_map(row).collect(),
     })
 }
@@ -217,15 +242,27 @@ pub fn coverage(
 pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, CoverageError> {
     let machine = DrawnMachine::draw(file, drawn.off_percent, drawn.friction, drawn.seed, number)?;
     let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };
+    let known = |mut log: Log| {
+        // The log states the step of the file, which is all that the board knows.
+        if let (DriveScale::Steps(step_m), Some(drive)) = (&mut log.header.drive, &file.actuator.acceleration)
+        {
+            *step_m = drive.step_m;
+        }
+        log
+    };
     let found = shake_machine(file, &machine.rig, drawn.seconds, number)
+        .map(known)
         .and_then(|log| identify(file, &[(PathBuf::from("log"), log)], &settings, &|_| ()));
     Ok(match found {
         Ok(found) => Identified {
             number,
             refused: found.refusal.as_ref().map(ToString::to_string),
+            doubted: found.doubted().map(ToString::to_string),
             missed: missed(&machine, &found),
         },
-        Err(error) => Identified { number, refused: Some(error.to_string()), missed: Vec::new() },
+        Err(error) => {
+            Identified { number, refused: Some(error.to_string()), doubted: None, missed: Vec::new() }
+        }
     })
 }
 

@@ -25,9 +25,10 @@ pub enum Doubt {
     LargerAtRest([f64; 2]),
     /// The cart never sticks: its friction is about constant only above this speed (m/s).
     NeverSticks(f64),
-    /// A step of the drive that imposes the cart's motion moves it by another distance than the file says.
+    /// A count of the cart's sensor, or a step of the drive that imposes its motion, is another distance than the file
+    /// says.
     Travel {
-        /// Travel per step, as a multiple of that of the file.
+        /// Travel per count, as a multiple of that of the file.
         share: f64,
         /// Its standard deviation.
         deviation: f64,
@@ -44,10 +45,59 @@ pub enum Doubt {
         allowed: f64,
         /// Residuals of windows of 0.5 s (rms), as a multiple of that.
         times: f64,
+        /// The same, in percent of the range of the motion.
+        percent: f64,
+    },
+    /// A friction comes out negative.
+    Negative {
+        /// Which one.
+        kind: ParameterKind,
+        /// Its value without the bound at 0.
+        value: f64,
+        /// Its standard deviation.
+        deviation: f64,
+    },
+    /// A value is far from that of the file.
+    Far {
+        /// Which one.
+        kind: ParameterKind,
+        /// How far, in its prior deviations.
+        deviations: f64,
+    },
+    /// The new numbers predict a channel worse than the old file does.
+    Worse {
+        /// The cart, or a joint from 1.
+        channel: String,
+        /// Errors (rms) in percent of the range, with the old file and with the new numbers.
+        percent: [f64; 2],
+    },
+    /// The new file predicts a channel worse than the numbers that were found.
+    Rewritten {
+        /// The cart, or a joint from 1.
+        channel: String,
+        /// Errors (rms) in percent of the range, with the numbers found and with the new file.
+        percent: [f64; 2],
+    },
+    /// Recordings that were not used are not predicted.
+    Unpredicted {
+        /// The cart, or a joint from 1.
+        channel: String,
+        /// Length of the windows (s).
+        window_s: f64,
+        /// Error (rms) in percent of the range.
+        percent: f64,
+        /// The largest that is accepted.
+        most: f64,
     },
 }
 
 impl Doubt {
+    /// Whether nothing is written unless the user trusts the numbers nevertheless. The law of friction alone is no
+    /// reason: the deviations allow for it.
+    pub fn needs_trust(&self) -> bool {
+        !matches!(self, Doubt::LargerAtRest(_) | Doubt::NeverSticks(_))
+    }
+
     /// What the model's law of friction says, if it is not that of the simulated machine of a rig file.
     pub(super) fn of_friction(model: &Model) -> impl Iterator<Item = Self> {
         let larger = (model.excess != [0.0; 2]).then_some(Doubt::LargerAtRest(model.excess));
@@ -93,8 +143,9 @@ impl core::fmt::Display for Doubt {
             ),
             Doubt::Travel { share, deviation } => write!(
                 f,
-                "A step moves the cart by {} times step_m (deviation {}): correct step_m, the driver's microsteps, or the \
-                 pulley in the file. Lengths and moments are wrong until then.",
+                "A count of the cart's sensor, or a step of its drive, is {} times the travel in the file (deviation {}): measure \
+                 how far the cart goes per count, and look at counts, microsteps and pulley. Masses and frictions are right only \
+                 with the new travel.",
                 significant(*share, 4),
                 significant(*deviation, 2)
             ),
@@ -110,12 +161,96 @@ impl core::fmt::Display for Doubt {
                 "The rail rises by {}°: level it, or the cart rolls off while the links balance.",
                 significant(slope_rad.to_degrees(), 2)
             ),
-            Doubt::Residual { channel, allowed, times } => write!(
+            Doubt::Residual { channel, allowed, times, percent } => write!(
                 f,
-                "The residuals of {channel} are {times:.1} times what quantisation and noise of its encoder allow ({}): the model \
-                 lacks something, or the times of the samples are not even.",
-                significant(*allowed, 2)
+                "The residuals of {channel} are {times:.1} times what quantisation and noise of its encoder allow ({}), and {} % \
+                 of its motion: the model lacks something, or the times of the samples are not even.",
+                significant(*allowed, 2),
+                significant(*percent, 2)
             ),
+            _ => self.fmt_of_numbers(f),
         }
+    }
+}
+
+impl Doubt {
+    /// What a value or a prediction casts doubt on.
+    fn fmt_of_numbers(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Doubt::Negative { kind, value, deviation } => write!(
+                f,
+                "{} comes out negative: {} (deviation {}). The file gets 0; what makes it negative is wrong elsewhere: the scale \
+                 of a sensor or of the force, the age of its readings, or the law of friction.",
+                capital(*kind),
+                significant(*value, 3),
+                significant(*deviation, 2)
+            ),
+            Doubt::Far { kind, deviations } => write!(
+                f,
+                "{} is {deviations:.1} prior deviations away from the file: {}.",
+                capital(*kind),
+                cause(*kind)
+            ),
+            Doubt::Worse { channel, percent: [file, found] } => write!(
+                f,
+                "The new numbers predict {channel} worse than the old file does, by {} instead of {} % of its motion: the model \
+                 lacks something, or the log says too little. Keep the old file.",
+                significant(*found, 3),
+                significant(*file, 3)
+            ),
+            Doubt::Rewritten { channel, percent: [found, file] } => write!(
+                f,
+                "The new file predicts {channel} worse than the numbers above, by {} instead of {} % of its motion: a rig file \
+                 cannot say what was found, such as a negative friction or a weighed scale without a motor.",
+                significant(*file, 3),
+                significant(*found, 3)
+            ),
+            Doubt::Unpredicted { channel, window_s, percent, most } => write!(
+                f,
+                "Recordings that were not used are not predicted: {channel} is off by {} % of its motion over {window_s} s, at \
+                 most {} % are accepted. Are they of this machine, after the same homing, and read in the same way?",
+                significant(*percent, 3),
+                significant(*most, 2)
+            ),
+            Doubt::LeftOut { .. }
+            | Doubt::Halves { .. }
+            | Doubt::LargerAtRest(_)
+            | Doubt::NeverSticks(_)
+            | Doubt::Travel { .. }
+            | Doubt::Scale(_)
+            | Doubt::Tilted(_)
+            | Doubt::Residual { .. } => Ok(()),
+        }
+    }
+}
+
+/// Name of a parameter at the beginning of a sentence.
+fn capital(kind: ParameterKind) -> String {
+    let name = kind.name_and_unit().0;
+    name[..1].to_uppercase() + &name[1..]
+}
+
+/// The likely cause of a value that is far from the file.
+fn cause(kind: ParameterKind) -> &'static str {
+    match kind {
+        ParameterKind::TotalMass => {
+            "the scale of the force or of the cart's sensor, or the masses of the file"
+        }
+        ParameterKind::FirstMoment(_) | ParameterKind::SecondMoment(_) | ParameterKind::Length(_) => {
+            "lengths or masses of the file, the period of the samples, or the counts of a sensor"
+        }
+        ParameterKind::Tilt | ParameterKind::Zero(_) => {
+            "the links did not hang still when they were homed, or the zero of a sensor"
+        }
+        ParameterKind::Delay => "a delay that the file does not state, or the age of the readings",
+        ParameterKind::DeadZone => "the driver, or the supply of the file",
+        ParameterKind::Travel => "counts, microsteps or pulley of the cart",
+        ParameterKind::EccentricSine(_)
+        | ParameterKind::EccentricCosine(_)
+        | ParameterKind::TwiceSine(_)
+        | ParameterKind::TwiceCosine(_) => {
+            "the magnet or its distance, the counts of the sensor, or the scale of the cart's"
+        }
+        _ => "something rubs or is loose, or another error looks like friction",
     }
 }

@@ -20,7 +20,7 @@ pub struct Estimate {
     pub new: f64,
     /// Standard deviation of the identified value.
     pub deviation: f64,
-    /// Values from the first and the second half of the recordings; only without a drive.
+    /// Values from the first and the second half of the recordings.
     pub halves: Option<[f64; 2]>,
     /// Whether the log says little about it: the deviation exceeds half of the prior one.
     pub held_by_prior: bool,
@@ -70,6 +70,8 @@ pub struct Identification {
     pub correlations: Vec<f64>,
     /// How well the model explains each channel.
     pub channels: Vec<ChannelFit>,
+    /// Whether the times are the ticks of the firmware, and the counts those of the rig file.
+    pub is_log: bool,
     /// Whether the drive is known, and with it the scale of masses and frictions.
     pub is_driven: bool,
     /// Whether the drive imposes the cart's motion: then the scale of masses and frictions is that of the file, and the
@@ -105,6 +107,7 @@ impl Identification {
             sample_s: record.dt_s,
             correlations: Vec::new(),
             channels: Vec::new(),
+            is_log: true,
             is_driven: true,
             is_moved: record.is_moved,
             left_out: Vec::new(),
@@ -127,6 +130,11 @@ impl Identification {
     /// The estimate of a parameter, if it was identified.
     pub fn estimate(&self, kind: ParameterKind) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.kind == kind)
+    }
+
+    /// The first doubt because of which nothing is written, unless the user trusts the numbers.
+    pub fn doubted(&self) -> Option<&Doubt> {
+        self.doubts.iter().find(|doubt| doubt.needs_trust())
     }
 
     /// The delay that the rig file should state (ticks), if that differs from the one it states.

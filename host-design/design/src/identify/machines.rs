@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 
 use super::channel::chain_of;
 use super::error::IdentifyError;
-use super::parameters::{FRICTION, Layout, ParameterKind, priors};
+use super::parameters::{FRICTION, Layout, ParameterKind, Prior, USUAL_DRAG, periodic, priors};
 use crate::plant::ChainParameters;
 use crate::reality::real_chain;
 use crate::rig::{FrictionLaw, PerJoint, Rig};
@@ -19,6 +19,8 @@ const HOMING_RAD: f64 = 0.5 * PI / 180.0;
 const TILT_RAD: f64 = 0.3 * PI / 180.0;
 /// Largest latency, in ticks: less than one.
 const LATENCY_TICKS: f64 = 0.95;
+/// Largest relative error of the travel per count of the cart.
+const TRAVEL: f64 = 0.02;
 /// Largest relative error of the motor's dead zone.
 const DEAD_ZONE: f64 = 0.5;
 
@@ -56,8 +58,8 @@ pub struct DrawnMachine {
 
 impl DrawnMachine {
     /// Draws machine `number` of those that differ from `file` by up to `off_percent` in masses, lengths and inertias.
-    /// Friction, homing, tilt, latency and dead zone are drawn, too; the motor's other constants are the file's. The
-    /// true dry friction is that at high speed.
+    /// Friction, air drag, homing, tilt, latency, dead zone, travel per count and errors of absolute sensors are
+    /// drawn, too; the motor's other constants are the file's. The true dry friction is that at high speed.
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders.
@@ -105,7 +107,11 @@ impl DrawnMachine {
         rig.reality.driver.latency_s = 0.5 * (LATENCY_TICKS + within(LATENCY_TICKS)) * rig.tick.period_s;
         let mut random_in = |low: f64, high: f64| random.random_range(low..=high);
         draw_law(&mut rig, law, &mut random_in);
-        let mut truth = truth(&rig)?;
+        let usual_drag: Vec<f64> =
+            (0..links).map(|link| USUAL_DRAG * priors[layout.second_moment(link)].value).collect();
+        draw_air(&mut rig, &usual_drag, &mut random_in);
+        draw_sensors(&mut rig, &priors, &mut random_in);
+        let mut truth = truth(file, &rig)?;
         if file.actuator.acceleration.is_some() {
             // Pulses begin in their tick, and are felt by the links alone, as ratios to the last first moment.
             rig.reality.driver = file.reality.driver.clone();
@@ -152,8 +158,37 @@ fn draw_law(rig: &mut Rig, law: TrueFriction, random: &mut dyn FnMut(f64, f64) -
     }
 }
 
-/// The true parameters of the machine of `rig`, including its `[reality]`.
-fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
+/// Draws the drag of each link around its `usual` one.
+fn draw_air(rig: &mut Rig, usual: &[f64], random: &mut dyn FnMut(f64, f64) -> f64) {
+    let drags = usual.iter().map(|usual| usual * libm::pow(FRICTION_FACTOR, random(-1.0, 1.0)));
+    rig.reality.air_drag.air_drag_n_m_s2_per_rad2 = PerJoint::each(drags.collect());
+}
+
+/// Draws the travel per count of the cart, and the errors once and twice per turn of sensors that have some.
+fn draw_sensors(rig: &mut Rig, priors: &[Prior], random: &mut dyn FnMut(f64, f64) -> f64) {
+    let travel = 1.0 + random(-TRAVEL, TRAVEL);
+    if let Some(drive) = &mut rig.actuator.acceleration {
+        drive.step_m *= travel;
+    }
+    if let Some(chain) = rig.chain_mut() {
+        chain.cart.encoder_step_m = chain.cart.encoder_step_m.map(|step_m| travel * step_m);
+    }
+    let links = rig.links();
+    let layout = Layout { links };
+    let mut each = |largest: &dyn Fn(usize) -> f64| {
+        let drawn: Vec<f64> = (0..links).map(|joint| largest(joint) * random(-1.0, 1.0)).collect();
+        PerJoint::each(drawn)
+    };
+    let amplitude = |largest: PerJoint| PerJoint::each((0..links).map(|j| largest.of(j).abs()).collect());
+    let sensors = &mut rig.reality.sensors;
+    sensors.eccentricity_rad = amplitude(each(&|joint| priors[layout.sine(joint)].deviation));
+    sensors.twice_per_turn_rad = amplitude(each(&|joint| priors[layout.twice_sine(joint)].deviation));
+    sensors.eccentricity_phase_rad = each(&|_| PI);
+    sensors.twice_per_turn_phase_rad = each(&|_| PI);
+}
+
+/// The true parameters of the machine of `rig`, including its `[reality]`, of which `file` is known.
+fn truth(file: &Rig, rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
     let real = real_chain(chain_of(rig)?, &rig.reality.parameters);
     let constants = ChainParameters::<f64>::of(&real);
     let (friction, sensors) = (&rig.reality.friction, &rig.reality.sensors);
@@ -171,10 +206,12 @@ fn truth(rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyError> {
         ParameterKind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
         ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
         ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j)),
-        ParameterKind::Presliding(_)
-        | ParameterKind::Travel
-        | ParameterKind::EccentricSine(_)
-        | ParameterKind::EccentricCosine(_) => None,
+        ParameterKind::Travel => Some(rig.sensors()[0].step::<f64>() / file.sensors()[0].step::<f64>()),
+        ParameterKind::EccentricSine(j) => Some(periodic(sensors, j, 0, libm::cos)),
+        ParameterKind::EccentricCosine(j) => Some(periodic(sensors, j, 0, libm::sin)),
+        ParameterKind::TwiceSine(j) => Some(periodic(sensors, j, 1, libm::cos)),
+        ParameterKind::TwiceCosine(j) => Some(periodic(sensors, j, 1, libm::sin)),
+        ParameterKind::Presliding(_) => None,
     };
     let kinds = Layout { links: real.links.len() }.kinds();
     Ok(kinds.into_iter().filter_map(|kind| Some((kind, value(kind)?))).collect())

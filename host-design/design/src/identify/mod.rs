@@ -22,7 +22,8 @@
 //!    squared innovations divided by their variances (Gauss–Newton).
 //! 4. Deviations: from the normal equations, widened by a share of the change that other models of the dry friction and
 //!    finer sampling cause.
-//! 5. Verdict: the last 10 s (of a short log, a quarter) are held out of the fit, and predicted in windows of 0.5 s.
+//! 5. Verdict: the last 10 s (of a short log, a quarter) are held out of the fit, and predicted in windows of 0.5 s
+//!    with the new rig file, which is read again for that.
 //!
 //! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
 
@@ -59,18 +60,20 @@ mod record;
 mod recorder;
 mod recordings;
 mod rerecorded;
+mod rig_file;
 mod rows;
 mod shooting;
 mod step;
 mod stribeck;
+mod suspect;
 mod table;
-mod travel;
 mod verdict;
 mod whole;
 mod window_errors;
 mod wiring;
 mod wiring_search;
 mod with_firmware;
+mod written;
 
 pub use coverage::{
     Coverage, CoverageError, CoverageRow, CoveredQuantity, Drawn, Identified, Missed, coverage, identified,
@@ -88,6 +91,7 @@ pub use parameters::ParameterKind;
 pub use realise::{Realised, RealisedCart, RealisedLink};
 pub use recorder::Recorder;
 pub use recordings::{Recordings, RowTimes};
+pub use rig_file::rig_file;
 pub use table::{
     AngleReference, AngleZero, Misreading, Reading, RecordingError, RecordingTable, SaidOfTable,
 };

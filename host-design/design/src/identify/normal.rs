@@ -117,6 +117,22 @@ impl Normal {
         self.gradient[index] = value;
     }
 
+    /// Square root of the diagonal of `A⁻¹ Σ g gᵀ A⁻¹` with the `gradients` g of parts of the data, where the unknowns
+    /// `held` stay as they are. None if A is not positive definite.
+    pub(super) fn scatter(&self, gradients: &[Vec<f64>], held: &[usize]) -> Option<Vec<f64>> {
+        let mut free = self.clone();
+        held.iter().for_each(|&i| free.hold(i, 0.0));
+        let factor = free.factor(0.0)?;
+        let mut squares = vec![0.0; self.size];
+        for gradient in gradients {
+            let mut by = gradient.clone();
+            held.iter().for_each(|&i| by[i] = 0.0);
+            factor.solve(&mut by);
+            squares.iter_mut().zip(by).for_each(|(sum, by)| *sum += by * by);
+        }
+        Some(squares.into_iter().map(f64::sqrt).collect())
+    }
+
     /// Factor of A with its diagonal multiplied by 1 + `damping`; none if that is not positive definite.
     pub(super) fn factor(&self, damping: f64) -> Option<Cholesky> {
         let n = self.size;

@@ -2,7 +2,7 @@
 
 use crate::plant::ChainParameters;
 use crate::reality::PRESLIDING_PER_DEFLECTION;
-use crate::rig::{Chain, LinkEncoder, Rig};
+use crate::rig::{Chain, LinkEncoder, Rig, SensorErrors};
 
 /// Travel (m) over which the bristle of the cart reverses, and rate (rad/s) below which the dry friction of a joint is
 /// about proportional to the rate: δ and ε of the model.
@@ -37,7 +37,8 @@ pub enum ParameterKind {
     Delay,
     /// Dead zone of the motor (V).
     DeadZone,
-    /// Travel per step of a drive that imposes the cart's motion, as a multiple of that of the file.
+    /// Travel of the cart per count of its sensor, or per step of a drive that imposes its motion, as a multiple of
+    /// that of the file.
     Travel,
     /// Zero error of a joint's encoder (rad).
     Zero(usize),
@@ -45,6 +46,10 @@ pub enum ParameterKind {
     EccentricSine(usize),
     /// Amplitude of the part that follows the cosine (rad).
     EccentricCosine(usize),
+    /// Amplitude of the part of a sensor's error twice per turn that follows the sine of twice the angle (rad).
+    TwiceSine(usize),
+    /// Amplitude of the part that follows the cosine (rad).
+    TwiceCosine(usize),
 }
 
 impl ParameterKind {
@@ -65,6 +70,11 @@ impl ParameterKind {
         )
     }
 
+    /// Whether it is a mass or a friction of the cart.
+    pub(super) fn is_of_cart(self) -> bool {
+        matches!(self, ParameterKind::TotalMass | ParameterKind::CartViscous | ParameterKind::CartDry)
+    }
+
     /// Name, with links and joints counted from 1, and SI unit.
     pub fn name_and_unit(self) -> (String, &'static str) {
         let of = |what: &str, joint: usize| format!("{what} {}", joint + 1);
@@ -82,10 +92,12 @@ impl ParameterKind {
             ParameterKind::Tilt => ("tilt of the rail".to_owned(), "rad"),
             ParameterKind::Delay => ("delay".to_owned(), "ticks"),
             ParameterKind::DeadZone => ("dead zone".to_owned(), "V"),
-            ParameterKind::Travel => ("travel per step".to_owned(), "of step_m"),
+            ParameterKind::Travel => ("travel per count, cart".to_owned(), "of the file's"),
             ParameterKind::Zero(j) => (of("zero, joint", j), "rad"),
             ParameterKind::EccentricSine(j) => (of("eccentricity (sine), joint", j), "rad"),
             ParameterKind::EccentricCosine(j) => (of("eccentricity (cosine), joint", j), "rad"),
+            ParameterKind::TwiceSine(j) => (of("twice per turn (sine), joint", j), "rad"),
+            ParameterKind::TwiceCosine(j) => (of("twice per turn (cosine), joint", j), "rad"),
         }
     }
 }
@@ -141,16 +153,22 @@ impl Layout {
     pub(super) fn cosine(self, joint: usize) -> usize {
         9 * self.links + 6 + joint
     }
+    pub(super) fn twice_sine(self, joint: usize) -> usize {
+        10 * self.links + 6 + joint
+    }
+    pub(super) fn twice_cosine(self, joint: usize) -> usize {
+        11 * self.links + 6 + joint
+    }
     /// Whether a parameter is the friction of a joint or the drag of a link.
     pub(super) fn is_dissipative(self, index: usize) -> bool {
         (self.viscous(1)..self.presliding(0)).contains(&index) && index != self.dry(0)
     }
-    /// Number of parameters on which the motion depends: they come first; the others belong to the encoders.
+    /// Number of parameters on which the motion may depend: they come first; the others belong to the encoders.
     pub(super) fn of_motion(self) -> usize {
         7 * self.links + 6
     }
     pub(super) fn count(self) -> usize {
-        10 * self.links + 6
+        12 * self.links + 6
     }
 
     /// What each parameter is, in order.
@@ -175,6 +193,8 @@ impl Layout {
         kinds.extend((0..n).map(ParameterKind::Zero));
         kinds.extend((0..n).map(ParameterKind::EccentricSine));
         kinds.extend((0..n).map(ParameterKind::EccentricCosine));
+        kinds.extend((0..n).map(ParameterKind::TwiceSine));
+        kinds.extend((0..n).map(ParameterKind::TwiceCosine));
         kinds
     }
 }
@@ -211,10 +231,20 @@ const ZERO_RAD: f64 = 0.03;
 const ECCENTRICITY_RAD: f64 = 0.002;
 /// That of the magnet of an absolute sensor, which no log is identified without (rad).
 const MAGNET_RAD: f64 = 0.01;
+/// That of its error twice per turn: 46 mrad have been measured of a cheap one.
+const MAGNET_TWICE_RAD: f64 = 0.02;
+/// That of an encoder's error twice per turn, if its eccentricity is identified (rad).
+const ENCODER_TWICE_RAD: f64 = 0.0005;
 /// That of a potentiometer, of which all is known is that it is linear to this share of its travel.
 const LINEARITY: f64 = 0.005;
 /// Prior deviation of a friction, as a multiple of its expected value.
 pub(super) const FRICTION: f64 = 10.0;
+/// Drag of a link as a multiple of its moment of inertia (1/rad²): measured ones are 0.004 to 0.006.
+pub(super) const USUAL_DRAG: f64 = 0.005;
+/// Prior deviation of a drag, as a multiple of the usual one.
+pub(super) const DRAG: f64 = 10.0;
+/// Prior deviation of the travel per count of the cart: a pulley is measured with a caliper.
+const TRAVEL: f64 = 0.05;
 
 /// Start values and deviations of all parameters, from a rig file.
 pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior> {
@@ -233,6 +263,10 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         deviation: FRICTION * given.max(usual),
     };
     let friction = &rig.reality.friction;
+    let of_sensor = |joint: usize, harmonic: usize, part: fn(f64) -> f64| Prior {
+        value: periodic(&rig.reality.sensors, joint, harmonic, part),
+        deviation: periodic_deviations(chain, joint, eccentricity)[harmonic],
+    };
     let prior = |kind: ParameterKind| match kind {
         ParameterKind::TotalMass => shape(constants.total_mass),
         ParameterKind::FirstMoment(j) => shape(constants.a[j]),
@@ -244,9 +278,10 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         ParameterKind::JointDry(j) => {
             dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j])
         }
-        ParameterKind::AirDrag(j) => {
-            Prior { value: rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j), deviation: 0.0 }
-        }
+        ParameterKind::AirDrag(j) => Prior {
+            value: rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j),
+            deviation: DRAG * USUAL_DRAG * constants.b[(j, j)],
+        },
         ParameterKind::Presliding(j) => {
             Prior { value: friction.presliding_rad.of(j) / PRESLIDING_PER_DEFLECTION, deviation: 0.0 }
         }
@@ -256,20 +291,46 @@ pub(super) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
             value: motor.dead_zone_v,
             deviation: motor.dead_zone_v.max(0.02 * motor.supply_v),
         }),
-        ParameterKind::Travel => Prior { value: 1.0, deviation: 0.0 },
+        ParameterKind::Travel => Prior { value: 1.0, deviation: TRAVEL },
         ParameterKind::Zero(_) => Prior { value: 0.0, deviation: ZERO_RAD },
-        ParameterKind::EccentricSine(j) | ParameterKind::EccentricCosine(j) => {
-            let deviation = match chain.links[j].encoder {
-                Some(LinkEncoder::Absolute { travel_rad, .. }) => {
-                    travel_rad.map_or(MAGNET_RAD, |travel_rad| LINEARITY * travel_rad)
-                }
-                _ if eccentricity => ECCENTRICITY_RAD,
-                _ => 0.0,
-            };
-            Prior { value: 0.0, deviation }
-        }
+        ParameterKind::EccentricSine(j) => of_sensor(j, 0, libm::cos),
+        ParameterKind::EccentricCosine(j) => of_sensor(j, 0, libm::sin),
+        ParameterKind::TwiceSine(j) => of_sensor(j, 1, libm::cos),
+        ParameterKind::TwiceCosine(j) => of_sensor(j, 1, libm::sin),
     };
     layout.kinds().into_iter().map(prior).collect()
+}
+
+/// The priors for a check of the wiring: what a few seconds hardly show is that of the file.
+pub(super) fn for_wiring(layout: Layout, priors: &[Prior]) -> Vec<Prior> {
+    let mut priors = priors.to_vec();
+    priors[layout.travel()].deviation = 0.0;
+    for joint in 0..layout.links {
+        for index in [layout.drag(joint), layout.twice_sine(joint), layout.twice_cosine(joint)] {
+            priors[index].deviation = 0.0;
+        }
+    }
+    priors
+}
+
+/// Part of the file's error of a joint's sensor once (0) or twice (1) per turn (rad): `part` is the cosine of its phase
+/// for the sine of the angle, and the sine for the cosine.
+pub(super) fn periodic(sensors: &SensorErrors, joint: usize, harmonic: usize, part: fn(f64) -> f64) -> f64 {
+    let [amplitude_rad, phase_rad] = match harmonic {
+        0 => [&sensors.eccentricity_rad, &sensors.eccentricity_phase_rad],
+        _ => [&sensors.twice_per_turn_rad, &sensors.twice_per_turn_phase_rad],
+    };
+    amplitude_rad.of(joint) * part(phase_rad.of(joint))
+}
+
+/// Prior deviations of the error of a joint's sensor once and twice per turn (rad).
+fn periodic_deviations(chain: &Chain, joint: usize, eccentricity: bool) -> [f64; 2] {
+    match chain.links[joint].encoder {
+        Some(LinkEncoder::Absolute { travel_rad: Some(travel_rad), .. }) => [LINEARITY * travel_rad; 2],
+        Some(LinkEncoder::Absolute { .. }) => [MAGNET_RAD, MAGNET_TWICE_RAD],
+        _ if eccentricity => [ECCENTRICITY_RAD, ENCODER_TWICE_RAD],
+        _ => [0.0; 2],
+    }
 }
 
 #[cfg(test)]

@@ -282,6 +282,7 @@ impl Record {
         for contact in 0..model.contacts() {
             state[2 * m + contact] = libm::tanh(state[m + contact] / (self.steps[contact] / 0.016));
         }
+        [0, m].iter().for_each(|&of_cart| state[of_cart] *= p[layout.travel()]);
         for joint in 0..m - 1 {
             state[joint + 1] -= p[layout.zero(joint)];
         }

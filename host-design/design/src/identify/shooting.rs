@@ -50,6 +50,18 @@ pub(super) struct Fit {
     pub(super) rms: Vec<f64>,
 }
 
+/// How well scaled parameters are known. Their deviations are those of the scatter of the windows' gradients `g`,
+/// `A⁻¹ Σ g gᵀ A⁻¹` (P. J. Huber, 5th Berkeley Symposium, 1967): residuals within a window may depend on each other.
+pub(super) struct Scatter {
+    /// Inverse of the normal matrix A, with the initial states eliminated.
+    pub(super) inverse: Vec<f64>,
+    /// Standard deviations, where a parameter at its bound is not free for the others.
+    pub(super) deviations: Vec<f64>,
+    /// The same if the bounds are not known: what a parameter at its bound may be is part of the others' deviations.
+    pub(super) open: Vec<f64>,
+    pub(super) normal: Normal,
+}
+
 /// Kept from the equations `H_zz δz + H_zp δp = g_z` of one window when δz is eliminated, to compute δz from δp.
 struct Reduced {
     states: Cholesky,
@@ -123,31 +135,21 @@ impl Shooting<'_> {
         squares.iter().map(|sum| (sum / predictions.len().max(1) as f64).sqrt()).collect()
     }
 
-    /// Inverse of the normal matrix of the scaled parameters, with the initial states eliminated, and the standard
-    /// deviation of each scaled parameter from the scatter of the windows' gradients `g`: `A⁻¹ Σ g gᵀ A⁻¹` (P. J.
-    /// Huber, 5th Berkeley Symposium, 1967), so the residuals within a window may depend on each other. A parameter at
-    /// its bound is not free for the others. None if the matrix has no inverse.
-    pub(super) fn deviations(&self, fit: &Fit) -> Option<(Vec<f64>, Vec<f64>)> {
+    /// How well the scaled parameters are known: see [`Scatter`]. None if the normal matrix has no inverse.
+    pub(super) fn scatter(&self, fit: &Fit) -> Option<Scatter> {
         let weights: Vec<f64> =
             fit.rms.iter().zip(&self.record.steps).map(|(rms, step)| rms.max(0.2 * step).powi(-2)).collect();
         let mut windows = Vec::new();
         let (normal, _) = self.linearise_each(&self.inputs(&fit.p), fit, &weights, &mut windows);
         let inverse = normal.factor(0.0)?.inverse();
-        let mut bounded = normal;
         let room = room_below(self.model.layout, self.priors, &fit.p);
         let held: Vec<usize> = (0..fit.p.len()).filter(|&i| room[i] > -1e-9).collect();
-        held.iter().for_each(|&i| bounded.hold(i, 0.0));
-        let factor = bounded.factor(0.0)?;
-        let mut squares = vec![0.0; fit.p.len()];
-        for gradient in &mut windows {
-            held.iter().for_each(|&i| gradient[i] = 0.0);
-            factor.solve(gradient);
-            squares.iter_mut().zip(&*gradient).for_each(|(sum, by)| *sum += by * by);
-        }
-        let deviation =
-            |i: usize| if held.contains(&i) { inverse[i * fit.p.len() + i] } else { squares[i] }.sqrt();
-        let deviations = (0..fit.p.len()).map(deviation).collect();
-        Some((inverse, deviations))
+        let own = |i: usize| inverse[i * fit.p.len() + i].sqrt();
+        let mut deviations = normal.scatter(&windows, &held)?;
+        held.iter().for_each(|&i| deviations[i] = own(i));
+        let mut open = normal.scatter(&windows, &[])?;
+        held.iter().for_each(|&i| open[i] = open[i].max(own(i)));
+        Some(Scatter { inverse, deviations, open, normal })
     }
 
     /// Predictions of `fit` in its windows: piece, sample, and the predicted measurements of all channels.

@@ -185,41 +185,53 @@ pub(super) struct Measured {
     pub(super) value: f64,
     /// Derivative by the coordinate of this channel; that by the coordinate below has the opposite sign.
     pub(super) by_angle: f64,
-    sine: f64,
-    cosine: f64,
+    /// Sine and cosine of a joint's angle, and of twice the angle, less those of hanging.
+    harmonics: [[f64; 2]; 2],
 }
 
 impl Model {
-    /// What channel `channel` measures at `state`: for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`,
-    /// with θ from the vertical and h the hanging angle.
+    /// What channel `channel` measures at `state`: for the cart its position over the travel per count, as a multiple
+    /// of that of the file; for a joint `θ + o + s (sin θ - sin h) + c (cos θ - cos h) - h`, with θ from the vertical
+    /// and h the hanging angle, and the same of twice the angle.
     pub(super) fn measure(&self, p: &[f64], state: &[f64], channel: usize) -> Measured {
-        let Some(joint) = channel.checked_sub(1) else {
-            return Measured { value: state[0], by_angle: 1.0, sine: 0.0, cosine: 0.0 };
-        };
         let layout = self.layout;
+        let Some(joint) = channel.checked_sub(1) else {
+            let by_angle = 1.0 / p[layout.travel()];
+            return Measured { value: by_angle * state[0], by_angle, harmonics: [[0.0; 2]; 2] };
+        };
         let hanging = if joint == 0 { PI } else { 0.0 };
         let below = if joint == 0 { -p[layout.tilt()] } else { state[joint] };
         let theta = state[joint + 1] - below;
         let (sine, cosine) = libm::sincos(theta);
+        let (sine_2, cosine_2) = (2.0 * sine * cosine, 1.0 - 2.0 * sine * sine);
         let (s, c) = (p[layout.sine(joint)], p[layout.cosine(joint)]);
-        let (sine, cosine_less) = (sine, cosine - if joint == 0 { -1.0 } else { 1.0 });
+        let (s_2, c_2) = (p[layout.twice_sine(joint)], p[layout.twice_cosine(joint)]);
+        let cosine_less = cosine - if joint == 0 { -1.0 } else { 1.0 };
+        let once = s * sine + c * cosine_less;
+        let twice = s_2 * sine_2 + c_2 * (cosine_2 - 1.0);
         Measured {
-            value: theta - hanging + p[layout.zero(joint)] + s * sine + c * cosine_less,
-            by_angle: 1.0 + s * cosine - c * sine,
-            sine,
-            cosine: cosine_less,
+            value: theta - hanging + p[layout.zero(joint)] + once + twice,
+            by_angle: 1.0 + s * cosine - c * sine + 2.0 * (s_2 * cosine_2 - c_2 * sine_2),
+            harmonics: [[sine, cosine_less], [sine_2, cosine_2 - 1.0]],
         }
     }
 
     /// Derivatives of a measurement by the parameters that it depends on directly: index and derivative of each.
-    pub(super) fn measured_by(&self, channel: usize, measured: &Measured) -> [(usize, f64); 4] {
+    pub(super) fn measured_by(&self, channel: usize, measured: &Measured) -> [(usize, f64); 6] {
         let layout = self.layout;
+        let [once, twice] = measured.harmonics;
         match channel.checked_sub(1) {
-            None => [(0, 0.0); 4],
+            None => {
+                let mut by = [(0, 0.0); 6];
+                by[0] = (layout.travel(), -measured.value * measured.by_angle);
+                by
+            }
             Some(joint) => [
                 (layout.zero(joint), 1.0),
-                (layout.sine(joint), measured.sine),
-                (layout.cosine(joint), measured.cosine),
+                (layout.sine(joint), once[0]),
+                (layout.cosine(joint), once[1]),
+                (layout.twice_sine(joint), twice[0]),
+                (layout.twice_cosine(joint), twice[1]),
                 (layout.tilt(), if joint == 0 { measured.by_angle } else { 0.0 }),
             ],
         }

@@ -86,6 +86,13 @@ fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() { format!("{value:.decimals$}") } else { "countless".to_owned() }
 }
 
+/// Largest accepted error of predictions over the windows with this index in [`WINDOWS_S`]: as a share of the channel's
+/// range, and what its sensor may add, as a multiple of its error.
+pub(super) fn accepted(is_driven: bool, window: usize) -> (f64, f64) {
+    let share = MOST_ERRORS[window];
+    if is_driven { (share * MOST_ERROR / MOST_ERRORS[0], 0.0) } else { (share, OF_SENSOR) }
+}
+
 /// Checks that the fit of every channel is good enough.
 pub(super) fn judge(channels: &[ChannelFit]) -> Result<(), Refusal> {
     for fit in channels {

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use upright_design::identify::{
-    Excitation, Identification, IdentifyError, Log, ParameterKind, Refusal, Settings, WiringFault, identify,
-    shake,
+    Doubt, Excitation, Identification, IdentifyError, Log, ParameterKind, Refusal, Settings, WiringFault,
+    identify, shake,
 };
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
@@ -37,6 +37,7 @@ const TRUSTED: Settings = Settings {
     eccentricity: false,
     weighed_kg_m: None,
     trust_wiring: true,
+    trust_numbers: false,
     without_drag: false,
     without_dry: false,
 };
@@ -134,7 +135,9 @@ fn readings_that_are_old_are_known_if_the_file_states_their_age() {
     let silent = rig("");
     log.header.hash = silent.hash();
     let found = run(&silent, &log, &TRUSTED).unwrap();
-    println!("{:?}", found.refusal);
+    println!("{:?} {:?}", found.refusal, found.doubts);
+    let is_negative = |doubt: &Doubt| matches!(doubt, Doubt::Negative { .. });
+    assert!(found.doubts.iter().any(is_negative), "{:?}", found.doubts);
     assert!(found.refusal.is_some() || errors(&found).iter().any(|&error| error > 10.0), "{found:?}");
 }
 

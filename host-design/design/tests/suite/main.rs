@@ -12,6 +12,7 @@ mod homing;
 mod identify;
 mod identify_coverage;
 mod identify_stepper;
+mod identify_truth;
 mod known_friction;
 mod lockstep;
 mod motor;

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use upright::table::Law;
 use upright_design::design::{Certified, design};
-use upright_design::identify::{Estimate, Identification, Log, ParameterKind, Settings, identify};
+use upright_design::identify::{
+    Estimate, Identification, Log, ParameterKind, Recordings, Settings, identify_recordings, rig_file,
+};
 use upright_design::number::significant;
 use upright_design::rig::{Rig, RigText, Tolerances};
 use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
@@ -15,7 +17,7 @@ use upright_design::verify::{VerifyError, brief};
 use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::record::Journal;
-use crate::identified::{json, rig_file, text};
+use crate::identified::{json, text};
 use crate::progress::{with_progress, with_spinner};
 
 /// Duration of the runs that the gains have to survive (s).
@@ -55,15 +57,16 @@ pub(super) fn identified(
     log: &Log,
 ) -> Result<Identification, Stop> {
     let settings = Settings::default();
-    let logs = [(PathBuf::from("the log"), log.clone())];
-    let found = with_progress(|progress| identify(plan.rig, &logs, &settings, progress))
-        .map_err(|error| Stop::Machine(error.to_string()))?;
+    let logs = Recordings::Logs(vec![(PathBuf::from("the log"), log.clone())]);
+    let text_of_file = Some(plan.text);
+    let found = with_progress(|progress| {
+        identify_recordings(plan.rig, text_of_file, &logs, None, &settings, progress)
+    })
+    .map_err(|error| Stop::Machine(error.to_string()))?;
     text(&plan.rig.name, &found, &settings).lines().for_each(|line| journal.found(line));
     journal.data(json(&plan.rig.name, &found));
-    match &found.refusal {
-        None => Ok(found),
-        Some(refusal) => Err(Stop::Machine(refusal.to_string())),
-    }
+    let reason = found.refusal.as_ref().map(ToString::to_string).or(found.doubted().map(ToString::to_string));
+    reason.map_or(Ok(found), |reason| Err(Stop::Machine(reason)))
 }
 
 /// The rig file with the numbers that were found, and gains for them.

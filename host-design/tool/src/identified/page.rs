@@ -57,7 +57,11 @@ pub fn page(
         name,
         command,
         seconds: significant(found.seconds, 3),
-        refusal: found.refusal.as_ref().map(ToString::to_string),
+        refusal: found
+            .refusal
+            .as_ref()
+            .map(ToString::to_string)
+            .or_else(|| found.doubted().filter(|_| !settings.trust_numbers).map(ToString::to_string)),
         estimates: found.estimates.iter().map(|estimate| row_texts(found, estimate)).collect(),
         fits: found.channels.iter().enumerate().map(fit_texts).collect(),
         windows: windows(found)

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use upright_design::identify::{
-    ChannelError, ChannelFit, Estimate, Identification, ParameterKind, Settings, WindowErrors,
+    ChannelError, ChannelFit, Doubt, Estimate, Identification, ParameterKind, Settings, WindowErrors,
 };
 use upright_design::number::significant;
 
@@ -177,9 +177,35 @@ fn scale_note(found: &Identification, settings: &Settings) -> String {
     }
 }
 
+/// How far the links' zeros are off.
+fn zeros_note(found: &Identification) -> String {
+    let zeros = found.estimates.iter().filter(|estimate| matches!(estimate.kind, ParameterKind::Zero(_)));
+    let worst = zeros.map(|zero| zero.new.abs()).fold(0.0, f64::max);
+    format!(
+        "The zeros of the links are off by up to {:.2}°. This belongs to this homing and is not in the file.",
+        worst.to_degrees()
+    )
+}
+
+/// Whether the recordings that were not used are predicted.
+fn unused_note(found: &Identification) -> Option<String> {
+    let percents = found.predicted.iter().flat_map(|errors| &errors.channels).map(|one| one.percent()[1]);
+    let most = percents.fold(0.0, f64::max);
+    let is_doubted = found.doubts.iter().any(|doubt| matches!(doubt, Doubt::Unpredicted { .. }));
+    (!found.predicted.is_empty() && !is_doubted).then(|| {
+        format!(
+            "The recordings that were not used are predicted: no window is off by more than {} % of the motion (rms).",
+            significant(most, 2)
+        )
+    })
+}
+
 /// What a reader has to know to judge the numbers.
 pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> {
-    let doubts = found.doubts.iter().map(ToString::to_string);
+    let doubts = found.doubts.iter().map(|doubt| match doubt.needs_trust() {
+        true => format!("Doubt: {doubt}"),
+        false => doubt.to_string(),
+    });
     // The others are of numbers that are written.
     if found.refusal.is_some() {
         return doubts.chain(row_notes(found)).collect();
@@ -187,6 +213,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
     let mut notes = vec![scale_note(found, settings)];
     notes.extend(doubts);
     notes.extend(row_notes(found));
+    notes.extend(unused_note(found));
     notes.push(
         "Single masses cannot be seen from outside: the new file keeps those of the old one where it can, and centres and \
          inertias follow."
@@ -203,6 +230,13 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
         notes.push(
             "With three links or more it is not known whether dry friction is larger at rest than in motion. If it is, frictions \
              may be wrong by more than their deviations."
+                .to_owned(),
+        );
+    }
+    if !found.is_log {
+        notes.push(
+            "No recording shows a wrong time base: if its period is wrong by 1 %, moments and frictions are wrong by 1 to 2 %, and \
+             all else fits. Compare the times with a clock."
                 .to_owned(),
         );
     }
@@ -223,12 +257,7 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
         }
         _ => (),
     }
-    let zeros = found.estimates.iter().filter(|estimate| matches!(estimate.kind, ParameterKind::Zero(_)));
-    let worst = zeros.map(|zero| zero.new.abs()).fold(0.0, f64::max);
-    notes.push(format!(
-        "The zeros of the links are off by up to {:.2}°. This belongs to this homing and is not in the file.",
-        worst.to_degrees()
-    ));
+    notes.push(zeros_note(found));
     notes.push(format!(
         "A log four times as long halves the deviations, as far as the friction model allows; this log had {:.0} s.",
         found.seconds
@@ -314,6 +343,7 @@ pub fn json(rig: &str, found: &Identification) -> Value {
         "is_driven": found.is_driven, "is_moved": found.is_moved, "left_out": windows_json(&found.left_out), "predicted": windows_json(&found.predicted),
         "channels": channels, "delay_ticks": found.other_delay().unwrap_or(found.delay_ticks),
         "doubts": found.doubts.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "doubted": found.doubted().map(ToString::to_string),
         "refused": found.refusal.as_ref().map(ToString::to_string),
     })
 }

@@ -80,7 +80,7 @@ fn a_real_single_pendulum_is_identified_and_its_unused_swing_predicted() {
     assert!(found(&all, "viscous friction, joint 1") >= 0.0 && found(&all, "air drag, link 1") > 1e-5);
     below(&percents(&all, 0.5), &[0.04]);
     below(&percents(&all, 2.0), &[0.14]);
-    assert!(!doubts(&all).contains("left out"), "{all}");
+    assert!(!doubts(&all).contains("left out") && !doubts(&all).contains("residuals"), "{all}");
     // Without air drag, dry friction looks like viscous friction: that is said.
     let without: Vec<&str> = ABSOLUTE.into_iter().chain(["--without-drag"]).collect();
     let (all, _) = identified(&file, &used, &unused, &without);
@@ -110,6 +110,33 @@ fn a_real_triple_pendulum_is_identified_and_its_unused_swings_predicted() {
     let (all, code) = identified(&file, &used, &unused, &without);
     assert_eq!(code, 3, "{all}");
     assert!(doubts(&all).contains("left out: dry friction, joint 2"), "{all}");
+}
+
+/// Every other row of the unused swing, at the same period: a pendulum that swings twice as fast.
+#[test]
+fn unused_recordings_of_another_pendulum_are_doubted_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = path_of("single-multiarm");
+    let (used, unused) = (recordings("single", &["1", "2"]), recordings("single", &["4"]));
+    let text = std::fs::read_to_string(&unused[0]).unwrap();
+    let rows: Vec<&str> = text.lines().skip(1).step_by(2).collect();
+    let other = folder.path().join("other.csv");
+    std::fs::write(&other, format!("{}\n{}\n", text.lines().next().unwrap(), rows.join("\n"))).unwrap();
+    let new = folder.path().join("new.toml");
+    let write = ["--write", new.to_str().unwrap()];
+    let options: Vec<&str> = ABSOLUTE.into_iter().chain(write).collect();
+    let (all, code) = identified(Path::new(&file), &used, &[other.to_str().unwrap().to_owned()], &options);
+    assert!(
+        code == 3 && doubts(&all).contains("not used are not predicted: joint 1 is off by"),
+        "{code} {all}"
+    );
+    assert!(!new.exists());
+    let trusted: Vec<&str> = options.iter().copied().chain(["--trust-numbers"]).collect();
+    let (_, code) = identified(Path::new(&file), &used, &[other.to_str().unwrap().to_owned()], &trusted);
+    assert!(code == 0 && new.exists());
+    // The negative control.
+    let (all, code) = identified(Path::new(&file), &used, &unused, &ABSOLUTE);
+    assert_eq!(code, 0, "{all}");
 }
 
 /// A double pendulum with a motor and a gear at each joint, whose rotors and gear friction are not in our model.

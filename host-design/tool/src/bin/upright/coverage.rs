@@ -18,7 +18,7 @@ use upright_tool::progress::with_bar;
 /// the true values.
 ///
 /// Masses, lengths and inertias are drawn within --off of the file, friction within a factor of 3 of what is usual;
-/// zeros, tilt, latency and dead zone are drawn, too.
+/// air drag, zeros, tilt, latency, dead zone, travel per count and errors of absolute sensors are drawn, too.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -118,18 +118,23 @@ impl IdentifiedMachinesCommand {
 }
 
 fn text(found: &Coverage) -> String {
-    let mut text =
-        format!("{:28}{:>8}{:>9}{:>11}{:>11}{:>11}\n", "", "numbers", "covered", "stated", "rms", "worst");
+    let mut text = format!(
+        "{:28}{:>8}{:>9}{:>9}{:>11}{:>11}{:>11}\n",
+        "", "numbers", "covered", "worst/σ", "stated", "rms", "worst"
+    );
     for row in &found.rows {
         let share = |covered: usize| format!("{:.0} %", 100.0 * covered as f64 / row.count as f64);
         let covered = row.covered.map_or("-".to_owned(), share);
         let stated = row.stated.map_or("-".to_owned(), |stated| format!("{stated:.3}"));
+        let furthest = row.furthest.map_or("-".to_owned(), |furthest| format!("{furthest:.1}"));
         text += &format!(
-            "{:28}{:>8}{covered:>9}{stated:>11}{:>11.3}{:>11.3} {}\n",
+            "{:28}{:>8}{covered:>9}{furthest:>9}{stated:>11}{:>11.3}{:>11.3} {}\n",
             row.name, row.count, row.rms, row.worst, row.unit
         );
     }
-    text += &format!("{} of {} machines are refused\n", found.refused.len(), found.machines);
-    let refused = found.refused.iter().map(|(number, reason)| format!("{number}: {reason}\n"));
-    text + &refused.collect::<String>()
+    for (machines, what) in [(&found.refused, "refused"), (&found.doubted, "doubted")] {
+        text += &format!("{} of {} machines are {what}\n", machines.len(), found.machines);
+        text.extend(machines.iter().map(|(number, reason)| format!("{number}: {reason}\n")));
+    }
+    text
 }

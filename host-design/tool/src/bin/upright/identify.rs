@@ -4,10 +4,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings};
+use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings, rig_file};
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
-use upright_tool::identified::{json, page, rig_file, text};
+use upright_tool::identified::{json, page, text};
 
 use crate::failure::Failure;
 use crate::reading::ReadingArgs;
@@ -22,8 +22,8 @@ use upright_tool::progress::with_progress;
 /// freely; --clamped says that the cart cannot move.
 ///
 /// First the wiring, then masses, lengths, moments, frictions, delay, dead zone and zeros, each with its standard
-/// deviation. Exit status 2 if a log cannot be read or is of another rig; 3 if the model does not fit, and then no rig
-/// file is written.
+/// deviation. Exit status 2 if a log cannot be read or is of another rig; 3 if the model does not fit or the numbers
+/// are doubted, and then no rig file is written.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -59,6 +59,9 @@ pub(crate) struct IdentifyCommand {
     /// Take the wiring from the file instead of identifying it
     #[arg(long)]
     trust_wiring: bool,
+    /// Write numbers that are doubted, too
+    #[arg(long)]
+    trust_numbers: bool,
     /// Leave the air drag of the links out, of free swings
     #[arg(long)]
     without_drag: bool,
@@ -96,11 +99,13 @@ impl IdentifyCommand {
             eccentricity: self.eccentricity,
             weighed_kg_m: self.weigh,
             trust_wiring: self.trust_wiring,
+            trust_numbers: self.trust_numbers,
             without_drag: self.without_drag,
             without_dry: self.without_dry,
         };
+        let old = std::fs::read_to_string(&self.rig)?;
         let found = with_progress(|progress| {
-            identify_recordings(&rig, &recordings, unused.as_ref(), &settings, progress)
+            identify_recordings(&rig, Some(&old), &recordings, unused.as_ref(), &settings, progress)
         })?;
         let mut out = std::io::stdout().lock();
         if self.json {
@@ -116,8 +121,12 @@ impl IdentifyCommand {
         if let Some(refusal) = &found.refusal {
             return Err(Failure::no_solution(format!("{}: {refusal}; nothing is written", rig.name)));
         }
+        if let (Some(doubt), false) = (found.doubted(), self.trust_numbers) {
+            let words = "nothing is written; --trust-numbers writes it nevertheless";
+            return Err(Failure::no_solution(format!("{}: {doubt} {words}", rig.name)));
+        }
         match &self.write {
-            Some(path) => self.write_rig(path, &rig, &found),
+            Some(path) => self.write_rig(path, &rig, &old, &found),
             None => Ok(()),
         }
     }
@@ -140,6 +149,9 @@ impl IdentifyCommand {
         if self.trust_wiring {
             typed.push_str(" --trust-wiring");
         }
+        if self.trust_numbers {
+            typed.push_str(" --trust-numbers");
+        }
         if self.without_drag {
             typed.push_str(" --without-drag");
         }
@@ -149,8 +161,7 @@ impl IdentifyCommand {
         typed
     }
 
-    fn write_rig(&self, path: &Path, rig: &Rig, found: &Identification) -> Result<(), Failure> {
-        let old = std::fs::read_to_string(&self.rig)?;
+    fn write_rig(&self, path: &Path, rig: &Rig, old: &str, found: &Identification) -> Result<(), Failure> {
         let names: Vec<String> = self.logs.iter().map(|log| log.display().to_string()).collect();
         let note = format!(
             "{} with the numbers that `upright identify` found from {:.0} s of {}.",
@@ -158,7 +169,7 @@ impl IdentifyCommand {
             found.seconds,
             names.join(", ")
         );
-        let text = rig_file(&old, rig, found, &note.replace(['\n', '\r'], " "), path)
+        let text = rig_file(old, rig, found, &note.replace(['\n', '\r'], " "), path)
             .map_err(|error| Failure::argument(format!("{}: {error}", self.rig.display())))?;
         write_atomically(path, text.as_bytes())?;
         eprintln!("{} written", path.display());

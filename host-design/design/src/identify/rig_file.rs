@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use upright_design::identify::{Identification, Realised, RealisedLink};
-use upright_design::number::rounded;
-use upright_design::rig::{MEASUREMENTS_OF_A_LINK, Rig, RigError, RigText};
+use super::estimated::Identification;
+use super::parameters::ParameterKind;
+use super::realise::{Realised, RealisedLink};
+use crate::number::rounded;
+use crate::rig::{MEASUREMENTS_OF_A_LINK, PerJoint, Rig, RigError, RigText};
 
 /// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
 const WITHIN: [&str; 5] = [
@@ -28,7 +30,7 @@ pub fn rig_file(
 ) -> Result<String, RigError> {
     let mut text = RigText::parse(old, file)?;
     if let Some(realised) = &found.realised {
-        for (key, value) in values(realised, rig, found.is_driven) {
+        for (key, value) in values(realised, rig, found.is_driven).into_iter().chain(sensors(rig, found)) {
             text.set(&key, &value)?;
         }
         for number in 1..=realised.links.len() {
@@ -77,10 +79,10 @@ fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, Strin
         values.push((format!("reality.{key}"), format!("[{}]", numbers.join(", "))));
     };
     each("joint_friction_n_m", |link| link.dry_n_m);
-    // Only free swings show these.
+    each("air_drag_n_m_s2_per_rad2", |link| link.air_drag);
+    // Only free swings show this.
     if !is_driven {
         each("presliding_rad", |link| link.presliding_rad);
-        each("air_drag_n_m_s2_per_rad2", |link| link.air_drag);
     }
     if let Some(motor) = &rig.actuator.motor {
         values.push(("actuator.dead_zone_v".to_owned(), number(realised.dead_zone_v)));
@@ -92,10 +94,61 @@ fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, Strin
     values
 }
 
+/// Keys and values of the sensors: the travel per count, unless the recording has a scale of its own, and the errors
+/// once and twice per turn.
+fn sensors(rig: &Rig, found: &Identification) -> Vec<(String, String)> {
+    let number = |value: f64| rounded(value, 6).to_string();
+    let mut values = Vec::new();
+    let of = |kind: ParameterKind| found.estimate(kind).map(|estimate| estimate.new);
+    let drive = rig.actuator.acceleration.as_ref().map(|drive| ("actuator.step_m", drive.step_m));
+    let cart = rig.chain().and_then(|chain| Some(("cart.encoder_step_m", chain.cart.encoder_step_m?)));
+    if let (true, Some((key, step_m)), Some(travel)) =
+        (found.is_log, drive.or(cart), of(ParameterKind::Travel))
+    {
+        values.push((key.to_owned(), number(travel * step_m)));
+    }
+    let file = &rig.reality.sensors;
+    type Parts = [fn(usize) -> ParameterKind; 2];
+    let harmonics: [(Parts, [(&str, &PerJoint); 2]); 2] = [
+        (
+            [ParameterKind::EccentricSine, ParameterKind::EccentricCosine],
+            [
+                ("eccentricity_rad", &file.eccentricity_rad),
+                ("eccentricity_phase_rad", &file.eccentricity_phase_rad),
+            ],
+        ),
+        (
+            [ParameterKind::TwiceSine, ParameterKind::TwiceCosine],
+            [
+                ("twice_per_turn_rad", &file.twice_per_turn_rad),
+                ("twice_per_turn_phase_rad", &file.twice_per_turn_phase_rad),
+            ],
+        ),
+    ];
+    for ([sine, cosine], keys) in harmonics {
+        let polar = |joint: usize| {
+            let (sine, cosine) = (of(sine(joint))?, of(cosine(joint))?);
+            Some([sine.hypot(cosine), libm::atan2(cosine, sine)])
+        };
+        let found: Vec<Option<[f64; 2]>> = (0..rig.links()).map(polar).collect();
+        if found.iter().all(Option::is_none) {
+            continue;
+        }
+        for (part, (key, file)) in keys.into_iter().enumerate() {
+            let one = |(joint, found): (usize, &Option<[f64; 2]>)| {
+                number(found.map_or(file.of(joint), |found| found[part]))
+            };
+            let all: Vec<String> = found.iter().enumerate().map(one).collect();
+            values.push((format!("reality.{key}"), format!("[{}]", all.join(", "))));
+        }
+    }
+    values
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::realise::RealisedCart;
     use super::*;
-    use upright_design::identify::RealisedCart;
 
     /// An identification that found nothing new.
     const NOTHING: Identification = Identification {
@@ -112,6 +165,7 @@ mod tests {
         realised: None,
         delay_ticks: 0,
         refusal: None,
+        is_log: true,
         is_driven: true,
         is_moved: false,
         left_out: Vec::new(),
