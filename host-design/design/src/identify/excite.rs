@@ -115,15 +115,14 @@ impl Excitation {
         self.amplitude_n * ramp * sum
     }
 
-    /// How far the model moves from `from_s` to `to_s` (s), as a share of the intended motion: at most 1. Before the end of
-    /// the run, 1 is reached once.
+    /// How far the model moves from `from_s` to `to_s` (s), as a share of the intended motion: at most 1.
     pub(super) fn reach(&self, from_s: f64, to_s: f64) -> f64 {
         let [from, to] = [from_s / REACH_S, to_s / REACH_S].map(|at| at.max(0.0) as usize);
         self.reach.iter().take(to).skip(from).copied().fold(0.0, f64::max)
     }
 
-    /// Finds by bisection the largest amplitude for which the model stays within [`AIM`] and the limits of force and speed
-    /// for the whole run. Of a long one, the beginning nearly always says enough.
+    /// Finds by bisection the largest amplitude for which the model stays within [`AIM`] and the limits of force and
+    /// speed for the whole run. Of a long one, the beginning nearly always says enough.
     fn find_amplitude(&mut self, rig: &Rig, chain: &Chain) {
         let record = Record::of(rig, &[], 1);
         let model = record.model(chain.gravity_m_per_s2);
@@ -155,8 +154,8 @@ impl Excitation {
         }
     }
 
-    /// How far the model moves in each [`REACH_S`] of the first `length_s` (s), as a share of the intended motion; none if it
-    /// goes beyond that or a limit.
+    /// How far the model moves in each [`REACH_S`] of the first `length_s` (s), as a share of the intended motion; none
+    /// if it goes beyond that or a limit.
     fn moved(&self, model: &Model, p: &[f64], rig: &Rig, length_s: f64) -> Option<Vec<f64>> {
         let m = model.coordinates();
         let dt_s = rig.tick.period_s * Record::usual_stride(rig.tick.period_s) as f64;

@@ -212,8 +212,8 @@ impl Feed {
         Some(f64::from(moved) * self.steps[0] / (f64::from(at - since) * self.period_s))
     }
 
-    /// Adapts the amplitude to the motion since the last call: so that, if the rig goes on moving by this multiple of what
-    /// the model does, its largest motion is the intended one.
+    /// Adapts the amplitude to the motion since the last call: so that, if the rig goes on moving by this multiple of
+    /// what the model does, its largest motion is the intended one.
     fn adapt(&mut self, log: &Log, begun: u32, last: u32) {
         let from = self.judged.saturating_sub(self.ticks(ADAPT_S));
         self.judged = last + self.ticks(ADAPT_S);

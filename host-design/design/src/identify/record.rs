@@ -356,8 +356,8 @@ impl Record {
         if seconds < least { Err(IdentifyError::TooShort { seconds, least }) } else { Ok(()) }
     }
 
-    /// Integration steps between two samples: pulses may come in slow ticks, which are smooth steps only for a force, and
-    /// a motor with a large gear ratio stops the cart within a tick.
+    /// Integration steps between two samples: pulses may come in slow ticks, which are smooth steps only for a force,
+    /// and a motor with a large gear ratio stops the cart within a tick.
     fn substeps(&self) -> usize {
         let longest_s =
             if self.is_moved { LONGEST_S } else { (LARGEST_SHARE * self.stops_within_s).min(LONGEST_STEP_S) };

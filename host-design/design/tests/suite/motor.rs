@@ -36,8 +36,9 @@ fn simulated(rig: &Rig, ticks: usize) -> Vec<[f64; 2]> {
     COMMANDS.iter().map(after).collect()
 }
 
-/// The closed form: `m v̇ = F - (d + c) v` with the force F of the voltage at standstill, the friction d of the cart and
-/// the back-EMF c as damping, which is 0 while the motor is off. With the time constant `lag_s`, the duty follows late.
+/// The closed form: `m v̇ = F - (d + c) v` with the force F of the voltage at standstill, the friction d of the cart
+/// and the back-EMF c as damping, which is 0 while the motor is off. With the time constant `lag_s`, the duty follows
+/// late.
 fn exact(rig: &Rig, ticks: usize, lag_s: f64) -> Vec<[f64; 2]> {
     let chain = rig.chain().unwrap();
     let motor = rig.actuator.motor.as_ref().unwrap();
