@@ -95,7 +95,7 @@ impl Doubt {
     /// Whether nothing is written unless the user trusts the numbers nevertheless. The law of friction alone is no
     /// reason: the deviations allow for it.
     pub fn needs_trust(&self) -> bool {
-        !matches!(self, Doubt::LargerAtRest(_) | Doubt::NeverSticks(_))
+        !matches!(self, Doubt::LargerAtRest(_) | Doubt::NeverSticks(_) | Doubt::Tilted(_))
     }
 
     /// What the model's law of friction says, if it is not that of the simulated machine of a rig file.

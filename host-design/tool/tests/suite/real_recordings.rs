@@ -119,9 +119,11 @@ fn unused_recordings_of_another_pendulum_are_doubted_and_nothing_is_written() {
     let file = path_of("single-multiarm");
     let (used, unused) = (recordings("single", &["1", "2"]), recordings("single", &["4"]));
     let text = std::fs::read_to_string(&unused[0]).unwrap();
-    let rows: Vec<&str> = text.lines().skip(1).step_by(2).collect();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names = lines.next().unwrap();
+    let rows: Vec<&str> = lines.step_by(2).collect();
     let other = folder.path().join("other.csv");
-    std::fs::write(&other, format!("{}\n{}\n", text.lines().next().unwrap(), rows.join("\n"))).unwrap();
+    std::fs::write(&other, format!("{names}\n{}\n", rows.join("\n"))).unwrap();
     let new = folder.path().join("new.toml");
     let write = ["--write", new.to_str().unwrap()];
     let options: Vec<&str> = ABSOLUTE.into_iter().chain(write).collect();
