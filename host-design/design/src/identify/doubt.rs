@@ -105,6 +105,20 @@ impl Doubt {
     }
 }
 
+fn scale_text(by: f64) -> String {
+    format!(
+        "Masses and moments are all about {} times those of the file: the force is rather {} times what is said. Check \
+         supply_v, torque_constant_n_m_per_a, resistance_ohm, gear_ratio, the pulley, and the unit of the drive.",
+        significant(by, 2),
+        significant(1.0 / by, 2)
+    )
+}
+
+fn tilt_text(slope_rad: f64) -> String {
+    let degrees = significant(slope_rad.to_degrees(), 2);
+    format!("The rail rises by {degrees}°: level it, or the cart rolls off while the links balance.")
+}
+
 impl core::fmt::Display for Doubt {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
@@ -149,18 +163,8 @@ impl core::fmt::Display for Doubt {
                 significant(*share, 4),
                 significant(*deviation, 2)
             ),
-            Doubt::Scale(by) => write!(
-                f,
-                "Masses and moments are all about {} times those of the file: the force is rather {} times what is said. Check \
-                 supply_v, torque_constant_n_m_per_a, resistance_ohm, gear_ratio, the pulley, and the unit of the drive.",
-                significant(*by, 2),
-                significant(1.0 / by, 2)
-            ),
-            Doubt::Tilted(slope_rad) => write!(
-                f,
-                "The rail rises by {}°: level it, or the cart rolls off while the links balance.",
-                significant(slope_rad.to_degrees(), 2)
-            ),
+            Doubt::Scale(by) => f.write_str(&scale_text(*by)),
+            Doubt::Tilted(slope_rad) => f.write_str(&tilt_text(*slope_rad)),
             Doubt::Residual { channel, allowed, times, percent } => write!(
                 f,
                 "The residuals of {channel} are {times:.1} times what quantisation and noise of its encoder allow ({}), and {} % \

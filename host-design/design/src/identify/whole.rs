@@ -1,4 +1,4 @@
-//! What the estimates of a driven machine say of its file as a whole: the scale of the force, and the slope of the rail.
+//! What the estimates of a driven machine say of its file as a whole: the scale of the force, the slope of the rail.
 
 use super::doubt::Doubt;
 use super::estimated::Estimate;

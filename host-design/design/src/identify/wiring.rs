@@ -7,6 +7,9 @@ use crate::number::significant;
 
 /// A wiring other than that of the file is believed when the residuals are smaller by this factor.
 const MARGIN: f64 = 2.0;
+/// Another reading of a table is believed only if its residuals are at most this share of the motion: of hundreds of
+/// readings, one or the other fits better than that which was described even if none is right.
+const MOST_RESIDUAL: f64 = 0.005;
 
 /// A fault of the wiring. Channels are cart (0) and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,12 +58,15 @@ pub struct WiringFound {
     pub margin: f64,
     /// Factor by which the residuals of the file's wiring are larger; 1 if it is the best.
     pub file_is_worse_by: f64,
+    /// Residuals of the best one as a share of the motion (geometric mean over the channels).
+    pub residual: f64,
 }
 
 impl WiringFound {
     /// Whether the wiring is taken to be that of the file: no other explains the log clearly better.
     pub fn is_as_in_file(&self) -> bool {
-        self.best.faults.is_empty() || self.file_is_worse_by < MARGIN
+        let is_explained = self.best.said.is_none() || self.residual < MOST_RESIDUAL;
+        self.best.faults.is_empty() || self.file_is_worse_by < MARGIN || !is_explained
     }
 
     /// Whether the second-best wiring may be the right one, too.
@@ -204,7 +210,8 @@ impl Wiring {
     /// This wiring with one more fault that is no sign: another pair, or an encoder whose counts are not yet wrong.
     pub(super) fn with_another(&self) -> Vec<Self> {
         if let Some(said) = &self.said {
-            let is_new = |misreading: &Misreading| !self.misread().contains(misreading);
+            let is_new =
+                |misreading: &Misreading| self.misread().iter().all(|other| !other.is_like(misreading));
             let others = said.others().into_iter().filter(is_new);
             return others.map(|misreading| self.with(WiringFault::Misread(misreading))).collect();
         }

@@ -26,7 +26,7 @@ const BEAM: usize = 4;
 const FREE_SAMPLE_S: f64 = 0.008;
 
 /// How thoroughly wirings are fitted.
-struct Effort {
+struct WiringEffort {
     /// Length of the windows (s).
     window_s: f64,
     /// Iterations for each wiring, and then for so many of the best ones.
@@ -41,16 +41,22 @@ struct Effort {
 }
 
 /// A force moves the links at once: windows are short.
-const DRIVEN: Effort =
-    Effort { window_s: super::shooting::WINDOW_S, iterations: [1, 4], rounds: 1, explained: 3.0, more: 2 };
+const DRIVEN: WiringEffort = WiringEffort {
+    window_s: super::shooting::WINDOW_S,
+    iterations: [1, 4],
+    rounds: 1,
+    explained: 3.0,
+    more: 2,
+};
 /// Free swings show their parameters more slowly, and their file may know next to nothing of the machine.
-const FREE: Effort = Effort { window_s: 0.5, iterations: [2, 8], rounds: 2, explained: 30.0, more: 1 };
+const FREE: WiringEffort =
+    WiringEffort { window_s: 0.5, iterations: [2, 8], rounds: 2, explained: 30.0, more: 1 };
 
 /// The measurements with each wiring undone.
-struct Search<'a> {
+struct WiringSearch<'a> {
     model: &'a Model,
     priors: &'a [Prior],
-    effort: &'a Effort,
+    effort: &'a WiringEffort,
     /// None if the measurements cannot be of this wiring.
     undone: &'a (dyn Fn(&Wiring) -> Option<Record> + Sync),
     progress: Progress<'a>,
@@ -61,7 +67,7 @@ pub(super) fn find(model: &Model, record: &Record, priors: &[Prior], progress: P
     let short = record.part(TIME_S[0], TIME_S[1]);
     let short = if short.pieces.is_empty() { record.clone() } else { short };
     let undone = |wiring: &Wiring| Some(wiring.undone(&short));
-    let search = Search { model, priors, effort: &DRIVEN, undone: &undone, progress };
+    let search = WiringSearch { model, priors, effort: &DRIVEN, undone: &undone, progress };
     let (file, others) = wirings(record.channels, record.is_moved, None);
     search.run(&short, file, &others)
 }
@@ -94,11 +100,11 @@ pub(super) fn find_in_tables(
     let Some(short) = undone(&file) else { return Ok(None) };
     // Without bristles, a joint has no state of its own that a short part does not show.
     let model = Model { has_bristles: false, substeps: short.model(model.gravity).substeps, ..model.clone() };
-    let search = Search { model: &model, priors, effort, undone: &undone, progress };
+    let search = WiringSearch { model: &model, priors, effort, undone: &undone, progress };
     Ok(Some(search.run(&short, file, &others)))
 }
 
-impl Search<'_> {
+impl WiringSearch<'_> {
     /// The best wiring; `short` are the measurements as they are.
     fn run(&self, short: &Record, file: Wiring, others: &[Wiring]) -> WiringFound {
         let effort = self.effort;
@@ -128,6 +134,7 @@ impl Search<'_> {
             second: scores[1].1.clone(),
             margin: libm::exp(scores[1].0 - scores[0].0),
             file_is_worse_by: libm::exp(of_file - scores[0].0),
+            residual: libm::exp(scores[0].0),
         }
     }
 

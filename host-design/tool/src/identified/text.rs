@@ -274,7 +274,7 @@ fn row_notes(found: &Identification) -> Vec<String> {
     ];
     if rows.costs() > DEAR {
         notes.push(format!(
-            "Rows every {} ms instead of every 2 ms: by the Cramér–Rao bound, they make the deviations {:.1} times as large (the \
+            "Rows every {} ms instead of every 2 ms: by the Cramér–Rao bound, they make the deviations up to {:.1} times as large (the \
              fastest mode of the hanging links has a period of {:.0} ms).",
             significant(1e3 * rows.period_s, 3),
             rows.costs(),

@@ -154,3 +154,58 @@ fn a_machine_that_the_model_lacks_is_refused() {
     assert!(all["refused"].as_str().unwrap().contains("does not fit"), "{all}");
     assert!(doubts(&all).contains("The residuals of joint 2 are"), "{all}");
 }
+
+/// 9 s of the single pendulum at 60 rows a second, in a table with a column that is not used.
+fn slow_table(folder: &Path, change: impl Fn(f64) -> f64) -> String {
+    let text = std::fs::read_to_string(&recordings("single", &["1"])[0]).unwrap();
+    let values = text.lines().filter_map(|line| line.parse::<f64>().ok());
+    let mut table = String::new();
+    for (row, angle) in values.step_by(4).enumerate() {
+        writeln!(table, "{row};{}", change(angle).to_string().replace('.', ",")).unwrap();
+    }
+    let file = folder.join("swing.csv");
+    std::fs::write(&file, table).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+const SLOW: [&str; 7] = ["--columns", "-,angle_1_rad", "--period", "0.016", "--zero", "upright", "--clamped"];
+
+#[test]
+fn the_six_lines_of_the_guide_identify_a_bare_pendulum() {
+    let folder = tempfile::tempdir().unwrap();
+    let guide = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/identify.md"))
+        .unwrap();
+    let lines = guide.split("```toml (not for a design)\n").nth(1).unwrap().split("```").next().unwrap();
+    assert_eq!(lines.lines().count(), 6);
+    let [file, new] = ["pendulum.toml", "found.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&file, lines).unwrap();
+    let table = slow_table(folder.path(), |angle| angle);
+    let arguments = ["identify", file.to_str().unwrap(), &table, "--write", new.to_str().unwrap()];
+    let output = upright(&[&arguments[..], &SLOW].concat());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("Rows every 16 ms"), "{}", stdout(&output));
+    // The length of the equivalent simple pendulum, from all recordings: docs/results/identified.md.
+    let rig = upright_design::rig::Rig::from_path(&new).unwrap();
+    let link = &rig.chain().unwrap().links[0];
+    let (mass, centre) = (link.mass_kg, link.centre_of_mass_m.unwrap());
+    let length = centre + link.inertia_kg_m2.unwrap() / (mass * centre);
+    assert!((length - 0.15315).abs() < 1e-4, "{length}");
+}
+
+/// What is refused has no number that no machine has.
+#[test]
+fn a_refusal_prints_no_impossible_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = path_of("single-multiarm");
+    // A sense that changes: no machine swings like this.
+    let table = slow_table(folder.path(), |angle| if angle > 3.3 { 2.0 * angle - 3.3 } else { angle });
+    for trust in [&["--trust-wiring"][..], &[]] {
+        let output = upright(&[&["identify", &file, &table][..], &SLOW, trust].concat());
+        assert_eq!(status(&output), 3, "{}", stdout(&output));
+        let said = stdout(&output).to_owned() + stderr(&output);
+        assert!(!said.contains("NaN") && !said.contains("inf "), "{said}");
+        for line in said.lines().filter(|line| line.contains("moment,") || line.contains("friction,")) {
+            assert!(!line.contains(" -"), "{line}");
+        }
+    }
+}

@@ -20,6 +20,8 @@ pub(in crate::identify) struct RecordingColumns {
     pub(super) angles: Vec<Scaled>,
     /// Factors by which the deviations from hanging of the angles are too large.
     pub(super) stretch: Vec<f64>,
+    /// The same of the angles of joints that were added up to angles against the vertical.
+    pub(super) joints: Vec<f64>,
     pub(super) drive: Option<Scaled>,
     /// Whether the drive is a force, and not a voltage.
     pub(in crate::identify) is_force: bool,
@@ -50,6 +52,7 @@ impl RecordingColumns {
             cart: None,
             angles: vec![(usize::MAX, 0.0); links],
             stretch: vec![1.0; links],
+            joints: vec![1.0; links],
             drive: None,
             is_force: false,
             reference: reference(reading, table, &meanings)?,
@@ -137,7 +140,7 @@ impl RecordingColumns {
                     1.0 => angle,
                     stretch => rest + (angle - rest) / stretch,
                 };
-                let relative = if is_absolute { angle - below } else { angle };
+                let relative = if is_absolute { (angle - below) / self.joints[joint] } else { angle };
                 below = angle;
                 // The angle nearest to the one before, at first the one nearest to hanging.
                 let before = if row > 0 { y[(row - 1) * channels + joint + 1] } else { 0.0 };

@@ -25,12 +25,28 @@ pub enum Misreading {
     Exchanged(usize, usize),
     /// A column gives this many times the motion.
     Scaled(usize, f64),
+    /// An angle against the vertical is that of the link below and this many times the angle of the joint.
+    Joint(usize, f64),
     /// All angles are this many times those of the motion.
     AllScaled(f64),
     /// The angles are measured against the vertical although it was said against the link below, or the reverse.
     Reference,
     /// The angles are 0 with the links upright although it was said hanging, or the reverse.
     Zero,
+}
+
+impl Misreading {
+    /// Whether both are one error: the same, or two factors of a column.
+    pub(in crate::identify) fn is_like(&self, other: &Self) -> bool {
+        match (*self, *other) {
+            (Misreading::Scaled(one, _), Misreading::Scaled(two, _))
+            | (Misreading::Joint(one, _), Misreading::Joint(two, _)) => one == two,
+            (Misreading::AllScaled(_), Misreading::AllScaled(_)) => true,
+            (Misreading::AllScaled(_), Misreading::Scaled(channel, _))
+            | (Misreading::Scaled(channel, _), Misreading::AllScaled(_)) => channel > 0,
+            _ => self == other,
+        }
+    }
 }
 
 /// What a table was said to be, in the words of its columns and of the options.
@@ -76,6 +92,11 @@ impl SaidOfTable {
             all.extend(links.flat_map(|link| angles.clone().map(move |by| Misreading::Scaled(link, by))));
             all.push(Misreading::Reference);
         }
+        if self.is_absolute {
+            let by = FACTORS.into_iter().chain([-1.0]);
+            let upper = 2..self.names.len();
+            all.extend(upper.flat_map(|link| by.clone().map(move |by| Misreading::Joint(link, by))));
+        }
         if self.has_cart {
             let lengths = FACTORS.into_iter().chain(LENGTHS);
             all.extend(lengths.map(|by| Misreading::Scaled(0, by)));
@@ -119,6 +140,12 @@ impl SaidOfTable {
                 self.explain_scale(&format!("column {}", self.names[1]), 1, by)
             }
             Misreading::AllScaled(by) => self.explain_scale("every column of an angle", 1, by),
+            Misreading::Joint(link, by) => format!(
+                "{} is {} and {} times the angle of joint {link}: correct its encoder's sense or counts before adding up",
+                self.names[link],
+                self.names[link - 1],
+                significant(by, 3)
+            ),
             Misreading::Reference if self.is_absolute => {
                 "the angles are measured against the link below: say --angles relative".to_owned()
             }
@@ -176,6 +203,7 @@ impl RecordingColumns {
                 }
                 Misreading::Scaled(0, by) => self.cart.iter_mut().for_each(|cart| scale(cart, by)),
                 Misreading::Scaled(link, by) => self.scale_angle(link - 1, by),
+                Misreading::Joint(link, by) => self.joints[link - 1] *= by,
                 Misreading::AllScaled(by) => (0..self.angles.len()).for_each(|at| self.scale_angle(at, by)),
                 Misreading::Reference => {
                     self.reference = match self.reference {

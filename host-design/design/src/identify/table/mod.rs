@@ -2,7 +2,7 @@
 //!
 //! - [`RecordingTable`]: the columns of a file and its rows of numbers.
 //! - [`Reading`]: what the columns mean, where their names leave it open; [`Misreading`]: how that may be wrong.
-//! - [`RecordingColumns`]: the columns by their meaning, checked against the rig; [`RecordingRows`], at equal intervals.
+//! - [`RecordingColumns`]: the columns by their meaning, checked against the rig; [`RecordingRows`]: even rows.
 
 mod column;
 mod columns;
