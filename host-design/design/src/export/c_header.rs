@@ -13,6 +13,8 @@ use crate::table::{MAX_SENSORS, MAX_STATES, TableValues, WithSize, with_size};
 const HEAD: &str = include_str!("head.txt");
 const STEPS: &str = include_str!("steps.txt");
 const COMPILER: &str = include_str!("compiler.h");
+const STATE: &str = include_str!("state.h");
+const READINGS: &str = include_str!("readings.h");
 const PARTS: &str = include_str!("parts.h");
 const TESTS_OF_PUSHES: &str = include_str!("tests_of_pushes.h");
 const TESTS_OF_SIZES: &str = include_str!("tests_of_sizes.h");
@@ -61,7 +63,9 @@ pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
         "static const upright_table_type upright_table = {{\n{}}};\n\n",
         initializer(table, observer)
     );
-    out.push_str(PARTS);
+    for part in [STATE, READINGS, PARTS] {
+        out.push_str(part);
+    }
     out.push_str(if table.thresholds.survives_pushes() { TESTS_OF_PUSHES } else { TESTS_OF_SIZES });
     out.push_str(CALLS);
     out += "\n#endif\n";
