@@ -24,7 +24,7 @@ fn in_simavr(header: &str, recording: &str) -> [u32; 4] {
 }
 
 /// The four numbers that this program has sent.
-fn sent_by(program: &Program, recording: &str) -> [u32; 4] {
+pub(super) fn sent_by(program: &Program, recording: &str) -> [u32; 4] {
     program.add("recording.h", recording);
     let output = program.compiled(UNO);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

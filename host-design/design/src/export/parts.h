@@ -1,8 +1,7 @@
 #if UPRIGHT_HAS_STEPS
-/* The step nearest to a position (m), or `otherwise` if that is not a number or beyond all counts. */
-static inline int32_t upright_nearest_step(float position_m, int32_t otherwise)
+/* The nearest whole number, or `otherwise` if `steps` is not a number or beyond all counts. */
+static inline int32_t upright_nearest(float steps, int32_t otherwise)
 {
-    float steps = position_m / upright_table.step_m;
     steps += steps < 0.0f ? -0.5f : 0.5f;
     return steps > -2147483648.0f && steps < 2147483648.0f ? (int32_t)steps : otherwise;
 }
@@ -35,7 +34,8 @@ static inline void upright_start(upright_controller *c)
     c->saturated = 0;
     c->setpoint_m = c->estimate[UPRIGHT_OUTPUT];
 #if UPRIGHT_HAS_STEPS
-    c->emitted = upright_nearest_step(c->estimate[0], 0);
+    c->emitted = upright_nearest(c->estimate[0] / upright_table.step_m, 0);
+    c->is_controlled = true;
 #endif
     if (!c->setpoint_is_given) {
         c->target_m = c->setpoint_m;
@@ -153,10 +153,40 @@ static inline upright_drive upright_actuate(upright_controller *c)
     c->applied_n = upright_limited(c->requested_n, speed);
     float commanded_speed = speed + c->applied_n * upright_table.lead_s;
     float commanded = c->estimate[0] + upright_table.lag_s * speed;
-    int32_t target = upright_nearest_step(commanded + commanded_speed * UPRIGHT_TICK_S, c->emitted);
+    float next = commanded + commanded_speed * UPRIGHT_TICK_S;
+    int32_t target = upright_nearest(next / upright_table.step_m, c->emitted);
     int32_t pulses = (int32_t)((uint32_t)target - (uint32_t)c->emitted);
     c->emitted = target;
     return pulses;
+}
+
+/* The pulses of a tick without the law. After it, they bring the cart to rest with the largest acceleration, so that no
+   step is lost; but not if drive or program may be at fault, or if upright_trip() has been called. */
+static inline upright_drive upright_idle(upright_controller *c)
+{
+    float before = c->braked_m_per_s;
+    if (c->is_controlled) {
+        float speed = upright_speed(c);
+        before = speed - speed == 0.0f ? speed : 0.0f;
+        c->is_controlled = false;
+        c->braked_rest = 0.0f;
+    }
+    c->braked_m_per_s = 0.0f;
+    bool is_cut = c->tripped || (c->state == UPRIGHT_FAULT && !upright_brakes(c->fault));
+    c->is_braking = before != 0.0f && !is_cut;
+    if (!c->is_braking) {
+        return 0;
+    }
+    float wanted = (0.0f - before) / UPRIGHT_TICK_S;
+    float acceleration = upright_limited(wanted, before);
+    if (acceleration != wanted) {
+        c->braked_m_per_s = before + acceleration * UPRIGHT_TICK_S;
+    }
+    float travel = 0.5f * (before + c->braked_m_per_s) * UPRIGHT_TICK_S / upright_table.step_m;
+    float steps = c->braked_rest + travel;
+    int32_t whole = upright_nearest(steps, 0);
+    c->braked_rest = steps - (float)whole;
+    return whole;
 }
 #else
 /* Limits the requested force; returns the duty cycle, -1 to 1. */
@@ -178,6 +208,12 @@ static inline upright_drive upright_actuate(upright_controller *c)
     return upright_saturate(limited / upright_table.force_limit_n, 1.0f);
 #endif
 }
+
+static inline upright_drive upright_idle(upright_controller *c)
+{
+    (void)c;
+    return 0.0f;
+}
 #endif
 
 /* The first limit that estimate or requested force exceeds. */
@@ -191,7 +227,7 @@ static inline upright_fault upright_exceeded(const upright_controller *c)
         return UPRIGHT_RAIL;
     }
     float angle = 0.0f;
-    for (uint8_t state = 2; state < UPRIGHT_STATES; state += 2) {
+    for (uint8_t state = 2; state < UPRIGHT_STATES; state = (uint8_t)(state + 2)) {
         angle += x[state];
         if (upright_magnitude(angle) > upright_table.angle_rad) {
             return UPRIGHT_ANGLE;
@@ -212,9 +248,9 @@ static inline void upright_predict_state(upright_controller *c, float u)
        diagonal of a block are equal. */
     next[0] = next[0] + x[0] + upright_table.ad[1][0] * x[1];
     next[1] = next[1] + x[1];
-    for (uint8_t joint = 2; joint < UPRIGHT_STATES; joint += 2) {
+    for (uint8_t joint = 2; joint < UPRIGHT_STATES; joint = (uint8_t)(joint + 2)) {
         const float *from_position = upright_table.ad[joint], *from_rate = upright_table.ad[joint + 1];
-        for (uint8_t row = 0; row < UPRIGHT_STATES; row += 2) {
+        for (uint8_t row = 0; row < UPRIGHT_STATES; row = (uint8_t)(row + 2)) {
             next[row] = next[row] + from_position[row] * x[joint] + from_rate[row] * x[joint + 1];
             next[row + 1] = next[row + 1] + from_position[row + 1] * x[joint] + from_position[row] * x[joint + 1];
         }

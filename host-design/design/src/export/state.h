@@ -11,7 +11,7 @@ typedef enum {
     UPRIGHT_READY,     /* motor off */
     UPRIGHT_ARMED,     /* motor off; balancing begins once the links have been upright and slow for long enough */
     UPRIGHT_BALANCING, /* motor on */
-    UPRIGHT_FAULT      /* motor off until upright_clear() */
+    UPRIGHT_FAULT      /* motor off until upright_clear(); with pulses, once it has brought the cart to rest */
 } upright_state;
 
 /* Memory of the tests of one sensor. */
@@ -50,6 +50,10 @@ typedef struct {
     uint32_t slow_ticks;
     uint32_t saturated;
     uint32_t rejected; /* measurements rejected so far */
+    uint8_t jumps;     /* ticks in a row with readings that cannot be, with the motor off */
+    bool loses_positions; /* whether the rig has to be homed again after the fault */
+    /* Set from anywhere, and reset only by upright_clear(): nothing else that runs can undo them. */
+    volatile uint8_t tripped, at_switch;
     float estimate[UPRIGHT_STATES];
     float innovation[UPRIGHT_SENSORS];
     float target_m;   /* requested set-point */
@@ -59,7 +63,11 @@ typedef struct {
     float requested_n; /* force requested by the law; with pulses, acceleration (m/s^2) */
     float applied_n;   /* the same after all limits */
 #if UPRIGHT_HAS_STEPS
-    int32_t emitted; /* pulses so far, from position 0 */
+    int32_t emitted;      /* pulses so far, from position 0 */
+    bool is_controlled;   /* whether the law has commanded the drive since it was last brought to rest */
+    bool is_braking;      /* whether the pulses of this tick bring it to rest */
+    float braked_m_per_s; /* speed while it is brought to rest */
+    float braked_rest;    /* travel left over from the ticks before (pulses) */
 #endif
     upright_sensor_memory sensors[UPRIGHT_SENSORS];
     float missing[2];
@@ -106,6 +114,7 @@ static inline void upright_trip_at(upright_controller *c, upright_fault fault, u
         c->fault_sensor = sensor;
     }
     c->state = UPRIGHT_FAULT;
+    c->loses_positions = c->loses_positions || UPRIGHT_HAS_STEPS || fault == UPRIGHT_ENCODER || fault == UPRIGHT_FROZEN;
     c->setpoint_is_given = false;
     c->requested_n = c->applied_n = 0.0f;
 }
