@@ -47,7 +47,23 @@ part! {
     }
 }
 
+/// Share of the way between the soft limits of the rail that set-points keep from either of them. The cart goes beyond
+/// its set-point: it overshoots, moves outwards before it returns, and noise and friction move it to and fro. The
+/// design's bound on the speed of the set-point leaves half of this margin for the latter.
+pub const SETPOINT_MARGIN: f32 = 0.1;
+
 impl<const NY: usize> Limits<NY> {
+    /// The lowest and the highest position (m) that the cart may be told to hold, or be balanced at. Position 0, where
+    /// the cart starts, always is one of them.
+    pub fn setpoints_m(&self) -> [f32; 2] {
+        let [low, high] = self.rail_m;
+        // Both products are finite, which the length of a rail without limits is not.
+        let margin = SETPOINT_MARGIN * high - SETPOINT_MARGIN * low;
+        let (lowest, highest) = (low + margin, high - margin);
+        // Comparisons, because `f32::min` would be a function call in the image.
+        [if lowest < 0.0 { lowest } else { 0.0 }, if highest > 0.0 { highest } else { 0.0 }]
+    }
+
     /// Limits that are never exceeded: for a controller without a supervisor.
     pub const fn none() -> Self {
         Self {
@@ -172,6 +188,23 @@ mod tests {
             assert_eq!(limits.within_half_a_turn(&raised), [5000, 7, -9]);
         }
         assert_eq!(limits.within_half_a_turn(&[-5000, 2047, 2046]), [-5000, 2047, 2046]);
+    }
+
+    #[test]
+    fn set_points_keep_a_tenth_of_the_rail_from_its_limits_and_position_0_always_is_one() {
+        let near = |rail_m, wanted: [f32; 2]| {
+            let found = Limits { rail_m, ..limits() }.setpoints_m();
+            assert!(
+                found.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-6),
+                "{found:?}"
+            );
+        };
+        near([-1.0, 1.0], [-0.8, 0.8]);
+        near([-0.25, 1.75], [-0.05, 1.55]);
+        near([-0.125, 1.875], [0.0, 1.675]);
+        near([-1.875, 0.125], [-1.675, 0.0]);
+        let [low, high] = Limits::<3>::none().setpoints_m();
+        assert!(low < -1e38 && high > 1e38 && high.is_finite());
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub use format::TABLE_FORMAT;
 pub use friction::FrictionMap;
 pub use gain_table::GainTable;
 pub use law::{Law, LawGains, PerLaw};
-pub use limits::Limits;
+pub use limits::{Limits, SETPOINT_MARGIN};
 pub use motor::MotorMap;
 pub use observer::ObserverGains;
 #[cfg(test)]

@@ -194,6 +194,7 @@ fn law(out: &mut Initializer, gains: &LawGains<MAX_STATES>, states: usize) {
 fn supervision(out: &mut Initializer, table: &TableValues) {
     let (limits, thresholds, sensors) = (&table.limits, &table.thresholds, table.sensors());
     out.floats("rail_m", limits.rail_m);
+    out.floats("setpoints_m", limits.setpoints_m());
     out.float("angle_rad", limits.angle_rad);
     out.float("speed_m_per_s", limits.speed_m_per_s);
     out.float("arm_angle_rad", limits.arm_angle_rad);

@@ -78,10 +78,10 @@ UPRIGHT_CALL bool upright_select(upright_controller *c, uint8_t law)
     return true;
 }
 
-/* Requests a position of the cart (m), within the soft limits of the rail. */
+/* Requests a position of the cart (m), within upright_table.setpoints_m: on its way, the cart goes beyond it. */
 UPRIGHT_CALL bool upright_set_setpoint(upright_controller *c, float position_m)
 {
-    if (!(position_m >= upright_table.rail_m[0] && position_m <= upright_table.rail_m[1])) {
+    if (!(position_m >= upright_table.setpoints_m[0] && position_m <= upright_table.setpoints_m[1])) {
         return false;
     }
     c->target_m = position_m;
@@ -89,7 +89,7 @@ UPRIGHT_CALL bool upright_set_setpoint(upright_controller *c, float position_m)
     return true;
 }
 
-/* Arms, if the rig is homed, its links are upright and its cart is within the soft limits. */
+/* Arms, if the rig is homed, its links are upright and its cart is where it may be told to stand. */
 UPRIGHT_CALL bool upright_arm(upright_controller *c)
 {
     int32_t upright[UPRIGHT_SENSORS];

@@ -83,7 +83,8 @@ typedef struct {
     float lag_s, lead_s; /* of a drive that follows late; speed that is commanded above the cart's, per acceleration */
 #endif
     /* Limits. */
-    float rail_m[2], angle_rad, speed_m_per_s, arm_angle_rad;
+    float rail_m[2], setpoints_m[2]; /* soft limits of the rail; where the cart may be told to stand */
+    float angle_rad, speed_m_per_s, arm_angle_rad;
     /* Thresholds of the tests of the innovation. */
     float innovation[UPRIGHT_SENSORS];
     float frozen[UPRIGHT_SENSORS];

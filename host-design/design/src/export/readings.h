@@ -90,7 +90,7 @@ static inline float upright_lean(const int32_t *counts)
 static inline bool upright_is_off_centre(const upright_controller *c)
 {
     float position = upright_table.step[0] * (float)c->counts[0];
-    return position < upright_table.rail_m[0] || position > upright_table.rail_m[1];
+    return position < upright_table.setpoints_m[0] || position > upright_table.setpoints_m[1];
 }
 
 static inline void upright_restart_slow(upright_controller *c)
