@@ -1,9 +1,9 @@
 /* Replays recorded ticks on the controller in controller.h. Reads and writes words of 32 bits.
 
    In, for each tick: what to do before it (1: home at rest, 2: select the law in the next byte, 4: arm, 8: take the
-   set-point, 16: clear, 32: disarm, 64: trip, 128: trip at a limit switch), the set-point, the readings of the counters.
-   Out: state, 99 if something was refused; fault, duty or pulses, whether the motor is on, requested and applied force
-   or acceleration, governed set-point, estimate, innovation. */
+   set-point, 16: clear, 32: disarm, 64: trip, 128: trip at a limit switch), the set-point, the readings of the sensors.
+   Out: state, or 99 if something was refused; fault, duty or pulses, whether the motor is on, requested and applied
+   force or acceleration, governed set-point, estimate, innovation. */
 
 /* As on the simulated bench: 32 bits for the cart, 16 for the links. */
 #define UPRIGHT_COUNTERS_OF_16_BITS 0x7ffeul
