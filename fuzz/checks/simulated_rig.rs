@@ -16,6 +16,9 @@ use upright::table::NoSwingUp;
 /// How the rig is shaken in the starting state `shaken`.
 pub(crate) const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 5.0, damping_n_s_per_m: 2.0 };
 
+/// A hand moves cart and links by this many counts in a tick: further would be a counter that jumps.
+const COUNTS_PER_TICK: i32 = 100;
+
 /// The whole firmware with the committed gains.
 pub(crate) type Tested = Firmware<'static, STATES, SENSORS>;
 
@@ -113,6 +116,16 @@ impl Start {
         }
     }
 
+    /// Moves cart and links by hand until these counts are added to those of the simulated state.
+    fn move_to(&mut self, offset: [i32; SENSORS]) {
+        while self.rig.offset != offset {
+            for (now, to) in self.rig.offset.iter_mut().zip(offset) {
+                *now += (to - *now).clamp(-COUNTS_PER_TICK, COUNTS_PER_TICK);
+            }
+            self.tick(None);
+        }
+    }
+
     fn ask(&mut self, request: Request) {
         assert_eq!(self.tick(Some(request)), Some(Answer::Done), "{request:?}");
     }
@@ -133,28 +146,31 @@ pub(crate) fn starts() -> [Start; 6] {
     start.ask(Request::Home);
     start.ask(Request::CheckSigns);
     while start.firmware.calibration().signs() != Signs::Checked {
-        start.rig.offset = limits.rest_counts;
         match start.firmware.calibration().signs() {
-            Signs::Rest(_) => start.wait(limits.still_ticks + 1),
+            Signs::Rest(_) => {
+                start.move_to(limits.rest_counts);
+                start.wait(limits.still_ticks + 1);
+            }
             Signs::Move(sensor) => {
-                start.rig.offset[usize::from(sensor)] += limits.sign_counts[usize::from(sensor)];
-                start.wait(1);
+                let mut moved = limits.rest_counts;
+                moved[usize::from(sensor)] += limits.sign_counts[usize::from(sensor)];
+                start.move_to(moved);
             }
             signs => panic!("{signs:?}"),
         }
     }
     // The motor pushes the cart; the links hang all the time.
-    start.rig.offset = limits.rest_counts;
+    start.move_to(limits.rest_counts);
     start.wait(limits.arm_ticks);
     start.ask(Request::Jog { along: true });
     while start.firmware.state() == State::Jogging {
         start.tick(Some(Request::Jog { along: true }));
         start.rig.state = [0.0; STATES];
-        start.rig.offset[0] += limits.sign_counts[0] / 20;
+        start.rig.offset[0] += COUNTS_PER_TICK;
     }
     assert_eq!(start.firmware.motor_sign(), MotorSign::Checked);
     let shaken = shaken(start.clone());
-    start.rig.offset = [0; SENSORS];
+    start.move_to([0; SENSORS]);
     start.wait(limits.arm_ticks + 1);
     let raised = start.clone();
     start.ask(Request::Arm);
@@ -175,7 +191,7 @@ pub(crate) fn starts() -> [Start; 6] {
 
 /// From hanging, with the motor checked, to being shaken.
 fn shaken(mut start: Start) -> Start {
-    start.rig.offset = TABLE.limits.rest_counts;
+    start.move_to(TABLE.limits.rest_counts);
     start.wait(TABLE.limits.still_ticks + 1);
     start.ask(Request::Shake(SHAKING));
     for force in [10, -10] {

@@ -1,10 +1,12 @@
-//! Samples that a board knows to be bad: the prediction takes their place, and three in a row are a fault. So is a
-//! reading of a noisy sensor that stays the same.
+//! Samples that a board knows to be bad: the prediction takes their place, and three in a row are a fault. So are those
+//! that jump while nothing is predicted, and a reading of a noisy sensor that stays the same.
 
 use super::Firmware;
 use crate::board::{BadSamples, Inputs};
 use crate::supervision::fault::Fault;
-use crate::supervision::finding::Finding;
+use crate::supervision::finding::{Finding, IN_A_ROW};
+use crate::supervision::jumps::jumped;
+use crate::supervision::supervisor::State;
 use crate::table::SwingUp;
 
 /// A sensor with this much of [`still_counts`](crate::table::AbsoluteZeros::still_counts) or more has noise of a count.
@@ -33,6 +35,36 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
         let lost = bad.finish().map(|sensor| Finding { fault: Fault::Encoder, sensor });
         lost.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor }))
+    }
+
+    /// The first sensor whose counter has moved further in this tick than its cart or joint can; none while positions
+    /// are not known. Such a tick's readings are not taken.
+    pub(super) fn jumped(&self) -> Option<u8> {
+        let observer = self.table.observer.as_ref().filter(|_| self.supervisor.uses_positions())?;
+        let moved = self.controller.encoders().moved(&self.raw_counts);
+        jumped(&moved, &observer.step.data.0[0], &self.table.limits, self.table.tick_s)
+    }
+
+    /// Counts a jump, after which the rig has to be slow anew before the motor comes on. The third in a row is a fault;
+    /// behind another fault, positions are lost all the same.
+    pub(super) fn judge_jump(&mut self, jumped: Option<u8>) {
+        let Some(sensor) = jumped else {
+            self.jumps = 0;
+            return;
+        };
+        self.jumps = self.jumps.saturating_add(1);
+        self.detection.count_rejected();
+        let counts = *self.controller.encoders().counts();
+        self.calibration.restart_slow(&counts);
+        if self.jumps < IN_A_ROW {
+            return;
+        }
+        if self.supervisor.state() == State::Fault {
+            self.supervisor.lose_positions();
+            self.calibration.invalidate(&self.table.limits);
+        } else {
+            self.lose_sensor(Finding { fault: Fault::Encoder, sensor });
+        }
     }
 
     /// The first sensor whose noise would have changed its reading within so many ticks.

@@ -75,6 +75,8 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     is_usable: bool,
     /// Whether the whole table has been found intact since arming.
     is_checked: bool,
+    /// Ticks in a row in which a counter has jumped while no model predicted it.
+    jumps: u32,
     table: &'t GainTable<NX, NY>,
     swing_up: &'t S,
     /// The motion that is being followed; while the rig holds, the last one.
@@ -165,6 +167,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             board_checks_tables: false,
             is_usable,
             is_checked: false,
+            jumps: 0,
             table,
             swing_up,
             moving: None,
@@ -296,9 +299,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// Takes and returns the counts of a tick without the control law.
     fn follow(&mut self) -> [i32; NY] {
-        self.controller.follow(&self.raw_counts);
+        let jumped = self.jumped();
+        if jumped.is_none() {
+            self.controller.follow(&self.raw_counts);
+        }
         let counts = *self.controller.encoders().counts();
         self.calibration.update(&counts, &self.table.absolute.still_counts, &self.table.limits);
+        self.judge_jump(jumped);
         counts
     }
 

@@ -10,6 +10,8 @@ use crate::gains::{SENSORS, STATES, TABLE, TICK_S};
 use crate::protocol::message::{Answer, Message, Request, Reset};
 use crate::supervision::inhibits::Inhibits;
 
+mod jumps;
+
 fn firmware<'t>(table: &'t GainTable<STATES, SENSORS>, reset: Reset) -> Firmware<'t, STATES, SENSORS> {
     Firmware::new(table, &NoSwingUp, [CounterWidth::Bits32; SENSORS], reset)
 }
@@ -85,6 +87,11 @@ fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does()
     }
 }
 
+/// The cart's counts while it is pushed from one of these positions to the next.
+fn pushed(ends: &[i32]) -> impl Iterator<Item = i32> {
+    ends.windows(2).flat_map(|ends| (1..=1000).map(|part| ends[0] + (ends[1] - ends[0]) / 1000 * part))
+}
+
 #[test]
 fn the_cart_is_homed_between_its_switches() {
     let mut firmware = firmware(&TABLE, Reset::Power);
@@ -99,12 +106,12 @@ fn the_cart_is_homed_between_its_switches() {
         (firmware.state(), *firmware.controller.encoders().counts())
     };
     step(0, Some(Request::HomeRail));
-    for cart in [0, -90_000, 0] {
+    for cart in pushed(&[0, -90_000, 0]) {
         assert_eq!(step(cart, None).0, State::Homing);
     }
-    let mut last = step(110_000, None);
-    for _ in 0..600 {
-        last = step(20_000, None);
+    let mut last = (State::Homing, [0; SENSORS]);
+    for cart in pushed(&[0, 110_000, 20_000]).chain([20_000; 600]) {
+        last = step(cart, None);
     }
     // The middle was found at 10 000.
     assert_eq!((last.0, last.1[0], last.1[1]), (State::Calibrated, 10_000, 2048));
@@ -120,12 +127,11 @@ fn homing_by_switches_tells_that_a_link_hangs_elsewhere_than_at_its_zero() {
         let command = Command { id: 1, request: Request::HomeRail };
         firmware.control(&INPUTS);
         firmware.finish(Some(&command), 0);
-        for tick in 0..1000 {
-            let limits = &table.limits;
-            let contacts =
-                Contacts { limit_low: tick < 3, limit_high: (3..6).contains(&tick), ..INPUTS.contacts };
+        let travel = table.limits.travel_counts[0];
+        for cart in pushed(&[0, travel / 1000 * 1000]).chain([travel; 3]).chain([travel - 1; 1000]) {
+            let contacts = Contacts { limit_low: cart < 1000, limit_high: cart == travel, ..INPUTS.contacts };
             let mut raw_counts = [0; SENSORS];
-            raw_counts[0] = if tick < 3 { 0 } else { limits.travel_counts[0] as u32 };
+            raw_counts[0] = cart as u32;
             firmware.control(&Inputs { raw_counts, contacts, ..INPUTS });
             firmware.finish(None, 0);
         }
@@ -147,10 +153,10 @@ fn a_rail_of_another_length_is_not_homed() {
     let command = Command { id: 1, request: Request::HomeRail };
     firmware.control(&INPUTS);
     firmware.finish(Some(&command), 0);
-    for (cart, limit_low, limit_high) in [(0, true, false), (150_000, false, true), (100_000, false, false)] {
-        let contacts = Contacts { limit_low, limit_high, ..INPUTS.contacts };
+    for cart in pushed(&[0, 150_000, 100_000]) {
+        let contacts = Contacts { limit_low: cart < 1000, limit_high: cart == 150_000, ..INPUTS.contacts };
         let mut raw_counts = INPUTS.raw_counts;
-        raw_counts[0] = cart;
+        raw_counts[0] = cart as u32;
         firmware.control(&Inputs { raw_counts, contacts, ..INPUTS });
         firmware.finish(None, 0);
     }

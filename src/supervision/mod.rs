@@ -31,6 +31,7 @@ pub mod finding;
 pub mod homing;
 pub mod inhibits;
 pub mod jog;
+pub mod jumps;
 pub mod pushes;
 pub mod shaking;
 pub mod sign_check;

@@ -10,7 +10,7 @@
 //
 // Once, while the link hangs still and the cart is in the middle, press the button: the motor holds the cart, and the
 // rig is homed. Hold the link upright and press: it balances as soon as the link has been still for UPRIGHT_ARM_S. Press
-// again to end it, or after a fault, whose code blinks on the board, to clear it; then home it again.
+// again to end it, or after a fault, which blinks on the board, to clear it; then home it again.
 //
 // Nothing here checks signs: with the motor off, turn the link counter-clockwise, and watch the count grow; then give
 // some pulses, and watch the cart move along +x. And wire an emergency stop that cuts the motor's supply.
@@ -43,8 +43,6 @@ ISR(PCINT2_vect)
     channels = now;
 }
 
-static bool motor_holds() { return controller.state != UPRIGHT_NOT_HOMED && controller.state != UPRIGHT_FAULT; }
-
 void setup()
 {
     digitalWrite(ENABLE, HIGH);
@@ -74,11 +72,12 @@ static void pressed(bool &wants_to_balance, const uint32_t *raw)
     }
 }
 
-// Steady light: it balances. After a fault it blinks as often as the fault's code says, then pauses.
+// Steady light: it balances. After a fault it blinks as often as docs/c-header.md says, then pauses.
 static bool light(uint16_t tick)
 {
-    uint16_t phase = (uint16_t)(tick * UPRIGHT_TICK_S * 4.0f) % (2 * (controller.fault + 3));
-    return controller.state == UPRIGHT_BALANCING || (phase % 2 && phase / 2 < (uint16_t)controller.fault);
+    uint8_t blinks = upright_blinks(controller.fault);
+    uint16_t phase = (uint16_t)(tick * UPRIGHT_TICK_S * 4.0f) % (2 * (blinks + 3));
+    return controller.state == UPRIGHT_BALANCING || (phase % 2 && phase / 2 < blinks);
 }
 
 void loop()
@@ -98,14 +97,17 @@ void loop()
     noInterrupts();
     const uint32_t raw[UPRIGHT_SENSORS] = {pulses_given(), link_counts};
     interrupts();
-    if (controller.state == UPRIGHT_BALANCING && (is_late || digitalRead(LIMIT_LOW) || digitalRead(LIMIT_HIGH))) {
+    if (controller.state == UPRIGHT_BALANCING && is_late) {
         upright_trip(&controller);
+    }
+    if (controller.state == UPRIGHT_BALANCING && (digitalRead(LIMIT_LOW) || digitalRead(LIMIT_HIGH))) {
+        upright_trip_at_switch(&controller);
     }
     int32_t pulses = upright_control(&controller, raw);
     if (!give(pulses, due)) {
         upright_trip(&controller);
     }
-    digitalWrite(ENABLE, !motor_holds());
+    digitalWrite(ENABLE, !upright_motor_is_on(&controller));
     upright_predict(&controller);
     if (controller.state == UPRIGHT_FAULT || controller.state == UPRIGHT_NOT_HOMED) {
         wants_to_balance = false;

@@ -10,7 +10,7 @@
 //
 // Once, while the link hangs still and the cart is in the middle, press the button: the rig is homed. Hold the link
 // upright and press: it balances as soon as the link has been still for UPRIGHT_ARM_S. Press again to end it, or after
-// a fault, whose code blinks on the board, to clear it.
+// a fault, which blinks on the board, to clear it.
 //
 // Nothing here checks signs: with the motor off, push the cart and turn the link, and watch the counts; then push the
 // cart with a small duty. And wire an emergency stop that cuts the motor's supply.
@@ -83,11 +83,12 @@ static void pressed(bool &wants_to_balance, const uint32_t *raw)
     }
 }
 
-// Steady light: the motor is on. After a fault it blinks as often as the fault's code says, then pauses.
+// Steady light: the motor is on. After a fault it blinks as often as docs/c-header.md says, then pauses.
 static bool light(uint16_t tick)
 {
-    uint16_t phase = (uint16_t)(tick * UPRIGHT_TICK_S * 4.0f) % (2 * (controller.fault + 3));
-    return controller.state == UPRIGHT_BALANCING || (phase % 2 && phase / 2 < (uint16_t)controller.fault);
+    uint8_t blinks = upright_blinks(controller.fault);
+    uint16_t phase = (uint16_t)(tick * UPRIGHT_TICK_S * 4.0f) % (2 * (blinks + 3));
+    return controller.state == UPRIGHT_BALANCING || (phase % 2 && phase / 2 < blinks);
 }
 
 void loop()
@@ -106,11 +107,14 @@ void loop()
     noInterrupts();
     const uint32_t raw[UPRIGHT_SENSORS] = {counts[0], counts[1]};
     interrupts();
-    if (controller.state == UPRIGHT_BALANCING && (is_late || digitalRead(LIMIT_LOW) || digitalRead(LIMIT_HIGH))) {
+    if (controller.state == UPRIGHT_BALANCING && is_late) {
         upright_trip(&controller);
     }
+    if (controller.state == UPRIGHT_BALANCING && (digitalRead(LIMIT_LOW) || digitalRead(LIMIT_HIGH))) {
+        upright_trip_at_switch(&controller);
+    }
     float duty = upright_control(&controller, raw);
-    drive(duty, controller.state == UPRIGHT_BALANCING);
+    drive(duty, upright_motor_is_on(&controller));
     upright_predict(&controller);
     if (controller.state == UPRIGHT_FAULT) {
         wants_to_balance = false;

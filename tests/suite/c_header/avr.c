@@ -60,7 +60,16 @@ int main(void)
     UCSR0B = _BV(TXEN0);
     upright_init(&c);
     upright_home(&c, at_rest, upright_table.rest_counts);
-    upright_control(&c, before_arming);
+    /* No faster than a link turns. */
+    memcpy(raw, at_rest, sizeof raw);
+    for (bool is_there = false; !is_there; upright_control(&c, raw)) {
+        is_there = true;
+        for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
+            int16_t left = (int16_t)(before_arming[i] - raw[i]);
+            raw[i] += (uint32_t)(int32_t)(left > 40 ? 40 : left < -40 ? -40 : left);
+            is_there = is_there && left == 0;
+        }
+    }
     upright_arm(&c);
     memcpy(raw, before_arming, sizeof raw);
     for (uint16_t tick = 0; tick < TICKS; tick++) {

@@ -25,7 +25,7 @@ fn in_simavr(header: &str, recording: &str) -> [u32; 4] {
 }
 
 /// The four numbers that this program has sent.
-fn sent_by(program: &Program, recording: &str) -> [u32; 4] {
+pub(super) fn sent_by(program: &Program, recording: &str) -> [u32; 4] {
     program.add("recording.h", recording);
     let compiled = program.compiled(UNO);
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));

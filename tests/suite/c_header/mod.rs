@@ -5,7 +5,9 @@
 
 mod arm;
 mod avr;
+mod interrupts;
 mod program;
+mod readings;
 mod recorded;
 mod steps;
 
@@ -74,7 +76,8 @@ fn differing(run: &FirmwareRun, answers: &[ControllerTick]) -> usize {
 fn agree(wanted: &ControllerTick, found: &ControllerTick) -> bool {
     let is_off = wanted.state != BALANCING;
     // With the motor off, the firmware reports no force.
-    (wanted.state, wanted.fault, wanted.duty) == (found.state, found.fault, found.duty)
+    (wanted.state, wanted.fault, wanted.duty, wanted.is_on)
+        == (found.state, found.fault, found.duty, found.is_on)
         && (is_off || wanted.values == found.values)
 }
 
@@ -279,6 +282,44 @@ fn a_compiler_that_may_change_results_is_refused() {
     assert!(!compiles(&["-std=gnu89"]));
     #[cfg(target_arch = "x86_64")]
     assert!(!compiles(&["-mfpmath=387"]));
+}
+
+#[test]
+fn no_compiler_warns_of_a_conversion() {
+    let compilers: [(&str, &[&str]); 6] = [
+        ("gcc", &["-std=c99", "-pedantic"]),
+        ("g++", &["-x", "c++", "-std=c++11", "-pedantic"]),
+        ("g++", &["-x", "c++", "-std=c++20"]),
+        ("clang", &["-std=c99", "-pedantic"]),
+        ("avr-gcc", &["-mmcu=atmega328p", "-O2"]),
+        ("avr-gcc", &["-mmcu=atmega328p", "-Os", "-x", "c++", "-std=gnu++11"]),
+    ];
+    let warnings = ["-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Werror", "-c"];
+    let calls = "#include \"controller.h\"\n\
+        int main(void)\n{\n    static upright_controller c;\n    static uint32_t raw[UPRIGHT_SENSORS];\n\
+        upright_init(&c);\n    upright_home(&c, raw, upright_table.rest_counts);\n    upright_arm(&c);\n\
+        upright_control(&c, raw);\n    upright_predict(&c);\n    upright_trip(&c);\n    return 0;\n}\n";
+    for name in
+        ["single-quanser-ip02", "single-absolute", "single-stepper", "quadruple-paper", "quadruple-robust"]
+    {
+        let (rig, table) = rig_and_table(name);
+        let program = Program::new(&c_header(rig, table).unwrap(), calls);
+        for (compiler, flags) in compilers.into_iter().filter(|(compiler, _)| is_there(compiler)) {
+            let output = program.compiled(Dialect { compiler, flags: &[flags, &warnings[..]].concat() });
+            assert!(
+                output.status.success(),
+                "{name} {compiler}: {}",
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
+    }
+    if is_there("avr-gcc") {
+        let (rig, table) = rig_and_table("single-quanser-ip02");
+        let narrow = c_header(rig, table).unwrap().replace("state = (uint8_t)(state + 2)", "state += 2");
+        let flags = [&["-mmcu=atmega328p"], &warnings[..]].concat();
+        let output = Program::new(&narrow, calls).compiled(Dialect { compiler: "avr-gcc", flags: &flags });
+        assert!(!output.status.success(), "negative control");
+    }
 }
 
 #[test]

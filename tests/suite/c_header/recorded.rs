@@ -1,6 +1,7 @@
 //! Runs of the whole firmware in closed loop, recorded as what the controller in C is given and has to answer.
 
 use upright::board::Output;
+use upright::control::actuator::Drive;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
@@ -17,8 +18,10 @@ pub(crate) type Defect = fn(&mut Pins, &mut Output);
 pub(crate) struct ControllerTick {
     pub(crate) state: u32,
     pub(crate) fault: u32,
-    /// Bits of the duty.
+    /// Bits of the duty, or pulses.
     pub(crate) duty: u32,
+    /// Whether the motor is on.
+    pub(crate) is_on: bool,
     /// Bits of requested force, applied force, governed set-point, estimate and innovation.
     pub(crate) values: Vec<u32>,
 }
@@ -26,7 +29,13 @@ pub(crate) struct ControllerTick {
 impl ControllerTick {
     /// From the words of a tick that `replay.c` writes.
     pub(crate) fn of(words: &[u32]) -> Self {
-        Self { state: words[0], fault: words[1], duty: words[2], values: words[3..].to_vec() }
+        Self {
+            state: words[0],
+            fault: words[1],
+            duty: words[2],
+            is_on: words[3] != 0,
+            values: words[4..].to_vec(),
+        }
     }
 }
 
@@ -35,11 +44,14 @@ pub(crate) const BALANCING: u32 = 3;
 pub(crate) const FAULT: u32 = 4;
 
 /// A run of the firmware.
+#[derive(Debug, Clone)]
 pub(crate) struct FirmwareRun {
     /// What the controller in C is given, from power-up on.
     pub(crate) input: Vec<Vec<u32>>,
-    /// What it has to answer from the first tick of balancing on.
+    /// What it has to answer from the first tick of balancing on, up to the tick of a fault.
     pub(crate) wanted: Vec<ControllerTick>,
+    /// The firmware's outputs after that.
+    pub(crate) after: Vec<Output>,
     /// The first tick of balancing.
     pub(crate) first: usize,
     pub(crate) fault: Option<Fault>,
@@ -132,7 +144,16 @@ pub(crate) fn recorded(
         }
         [action, setpoint.to_bits()].into_iter().chain(counters.iter().copied()).collect()
     });
-    FirmwareRun { input: input.collect(), wanted, first, fault: recording.fault }
+    let after = outputs[first + wanted.len()..].to_vec();
+    FirmwareRun { input: input.collect(), wanted, after, first, fault: recording.fault }
+}
+
+/// The command of an output: bits of the duty, or pulses.
+pub(crate) fn command(output: &Output) -> u32 {
+    match output.drive {
+        Drive::Steps(pulses) => pulses as u32,
+        Drive::Force(_) | Drive::Duty(_) => output.duty.to_bits(),
+    }
 }
 
 /// What the controller in C has to answer while the firmware balances, and in the tick in which it turns the motor off.
@@ -147,7 +168,7 @@ fn wanted(recording: &Recording, outputs: &[Output]) -> Vec<ControllerTick> {
             let values = [requested, applied, setpoint].into_iter().chain(estimates).copied().collect();
             let fault = recording.fault.filter(|_| !balances(tick.state)).map_or(0, |fault| fault.code());
             let state = if balances(tick.state) { BALANCING } else { FAULT };
-            ControllerTick { state, fault: fault.into(), duty: output.duty.to_bits(), values }
+            ControllerTick { state, fault: fault.into(), duty: command(output), is_on: output.enable, values }
         })
         .collect()
 }

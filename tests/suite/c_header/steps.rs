@@ -1,15 +1,17 @@
 //! The header for a drive with pulses: against the firmware's controller and its supervision, in closed loop.
 
 use super::program::is_there;
-use super::recorded::{BALANCING, ControllerTick, FAULT, FirmwareRun, scenario};
+use super::recorded::{BALANCING, ControllerTick, Defect, FAULT, FirmwareRun, command, recorded, scenario};
 use super::{STRICT, differing, first_difference, replayed};
 use crate::published::{rig_and_table, table};
+use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::control::controller::Controller;
 use upright::supervision::debounce::Debounce;
 use upright::supervision::detection::Detection;
 use upright::supervision::envelope;
 use upright::supervision::fault::Fault;
+use upright::supervision::slow_drive::SlowDrive;
 use upright::table::{Equilibrium, GainTable, Law};
 use upright_design::export::c_header;
 use upright_design::rig::Rig;
@@ -58,7 +60,16 @@ impl WithSize for StepRun<'_> {
         let words = |action: u32, setpoint: f32, raw: &[u32]| {
             [action, setpoint.to_bits()].into_iter().chain(raw.iter().copied()).collect::<Vec<u32>>()
         };
-        let mut input = vec![words(1 | 2 | law_index << 8, 0.0, &hanging), words(0, 0.0, &raw)];
+        let mut input = vec![words(1 | 2 | law_index << 8, 0.0, &hanging)];
+        // No faster than a link turns.
+        let mut lifted = hanging;
+        while lifted != raw {
+            for ((sensor, lifted), &to) in lifted.iter_mut().enumerate().zip(&raw) {
+                let left = (to.wrapping_sub(*lifted) as i16).clamp(-20, 20);
+                *lifted = Bench::reading(sensor, lifted.wrapping_add(i32::from(left) as u32));
+            }
+            input.push(words(0, 0.0, &lifted));
+        }
         let arm_ticks = table.limits.arm_ticks as usize;
         // Balancing begins in the last tick of those that it has to be still.
         input.extend((1..arm_ticks).map(|tick| words(if tick == 1 { 4 | 8 } else { 8 }, 0.0, &raw)));
@@ -81,7 +92,7 @@ impl WithSize for StepRun<'_> {
             }
             bench.tick(Drive::Steps(pulses));
         }
-        FirmwareRun { input, wanted, first, fault: balanced.fault }
+        FirmwareRun { input, wanted, after: Vec::new(), first, fault: balanced.fault }
     }
 }
 
@@ -120,8 +131,14 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
         let exceeded = envelope::exceeded(limits, self.controller.estimate().as_slice(), command.requested_n);
         self.fault = exceeded.or(found.map(|finding| finding.fault)).or(of_force);
         let Drive::Steps(mut pulses) = command.drive else { panic!("{command:?}") };
-        if self.fault.is_some() {
-            pulses = 0;
+        let mut is_on = true;
+        if let Some(fault) = self.fault {
+            let mut brake = SlowDrive::default();
+            if fault.leaves_drive_working() {
+                brake.take_over(self.controller.estimate()[1]);
+            }
+            is_on = brake.is_moving();
+            pulses = self.table.steps.as_ref().map_or(0, |steps| brake.pulses(steps, self.table.tick_s));
         }
         let numbers = [command.requested_n, command.applied_n, self.controller.law_state().setpoint];
         let estimate = self.controller.estimate().iter().chain(self.controller.innovation().iter());
@@ -129,6 +146,7 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
             state: if self.fault.is_some() { FAULT } else { BALANCING },
             fault: self.fault.map_or(0, |fault| fault.code().into()),
             duty: pulses as u32,
+            is_on,
             values: numbers.iter().chain(estimate).map(|value| value.to_bits()).collect(),
         };
         self.controller.predict_with(|counts, corrected, force| {
@@ -187,7 +205,7 @@ fn a_speed_limit_that_is_left_out_and_a_pulse_that_is_lost_are_noticed() {
 }
 
 #[test]
-fn faults_of_a_stepper_stop_the_pulses_in_the_tick_of_the_firmware() {
+fn faults_of_a_stepper_end_the_law_in_the_tick_of_the_firmware() {
     if !is_there("gcc") {
         return;
     }
@@ -241,6 +259,58 @@ fn faults_of_a_stepper_stop_the_pulses_in_the_tick_of_the_firmware() {
         if expected == [Fault::Motor] {
             let at_cart = header.replace("UPRIGHT_MOTOR_SENSOR 1", "UPRIGHT_MOTOR_SENSOR 0");
             assert!(differing(&run, &replayed(&at_cart, STRICT, &run.input)) > 0);
+        }
+    }
+}
+
+/// What the controller in C is told of a defect, in every tick from then on: see `replay.c`.
+const TRIP: u32 = 64;
+const TRIP_AT_SWITCH: u32 = 128;
+
+/// A run of the whole firmware, with a defect that the controller in C hears of by `action`, and its answers. It comes
+/// when the cart is fastest.
+fn stopped(name: &'static str, defect: Defect, action: u32) -> (FirmwareRun, Vec<ControllerTick>) {
+    let (rig, table) = rig_and_table(name);
+    let mut scenario = scenario(rig, Law::Lqr, 300);
+    // The cart has to catch the link.
+    scenario.start[2] = 0.04;
+    let speed = |tick: &ControllerTick| f32::from_bits(tick.values[4]).abs();
+    let healthy = recorded(rig, table, &scenario, None).wanted;
+    let fastest = (3..100).max_by(|&a, &b| speed(&healthy[a]).total_cmp(&speed(&healthy[b]))).unwrap();
+    let mut run = recorded(rig, table, &scenario, Some((fastest, defect)));
+    for row in &mut run.input[run.first + fastest..] {
+        row[0] |= action;
+    }
+    let answers = replayed(&c_header(rig, table).unwrap(), STRICT, &run.input);
+    (run, answers)
+}
+
+#[test]
+fn after_a_fault_a_steppers_cart_is_braked_with_the_pulses_of_the_whole_firmware() {
+    if !is_there("gcc") {
+        return;
+    }
+    let defects: [(Defect, u32, Fault, bool); 4] = [
+        (|pins, _| pins.raw_counts[1] = pins.raw_counts[1].wrapping_add(700), 0, Fault::Encoder, true),
+        (|pins, _| pins.contacts.limit_high = true, TRIP_AT_SWITCH, Fault::LimitSwitch, true),
+        (|pins, _| pins.contacts.emergency_stop = true, TRIP, Fault::EmergencyStop, false),
+        (|_, output| *output = Output::OFF, 0, Fault::Motor, false),
+    ];
+    for (defect, action, fault, brakes) in defects {
+        for name in ["single-stepper", "quadruple-stepper"] {
+            let (run, answers) = stopped(name, defect, action);
+            assert_eq!(run.fault, Some(fault), "{name}");
+            let from = run.first + run.wanted.len() - 1;
+            let wanted = [run.wanted.last().unwrap().duty].into_iter().chain(run.after.iter().map(command));
+            let wanted: Vec<i32> = wanted.map(|pulses| pulses as i32).collect();
+            let found: Vec<i32> = answers[from..].iter().map(|tick| tick.duty as i32).collect();
+            assert_eq!(found, wanted, "{name} {fault}");
+            let on = run.after.iter().map(|output| output.enable);
+            assert!(on.eq(answers[from + 1..].iter().map(|tick| tick.is_on)), "{name} {fault}");
+            let braking = wanted.iter().filter(|pulses| **pulses != 0).count();
+            println!("{name} {fault}: {:?}", &wanted[..braking]);
+            assert_eq!(braking > 0, brakes, "{name} {fault}: {wanted:?}");
+            assert!(answers[from..].iter().all(|tick| tick.state == FAULT), "{name} {fault}");
         }
     }
 }

@@ -3,34 +3,24 @@
 use core::fmt::Write;
 
 use upright::control::observer::PredictionPattern;
-use upright::supervision::fault::Fault;
+use upright::supervision::jumps::furthest_counts;
 use upright::table::{Law, LawGains, ObserverGains};
 
+use super::absolute::Readings;
 use super::initializer::Initializer;
+use super::{calling, faults};
 use crate::rig::Rig;
 use crate::table::{MAX_SENSORS, MAX_STATES, TableValues};
 
 const HEAD: &str = include_str!("head.txt");
 const STEPS: &str = include_str!("steps.txt");
 const COMPILER: &str = include_str!("compiler.h");
+const STATE: &str = include_str!("state.h");
+const READINGS: &str = include_str!("readings.h");
 const PARTS: &str = include_str!("parts.h");
 const TESTS_OF_PUSHES: &str = include_str!("tests_of_pushes.h");
 const TESTS_OF_SIZES: &str = include_str!("tests_of_sizes.h");
 const CALLS: &str = include_str!("calls.h");
-
-/// The faults that the controller in C knows, with their names there; the codes are those of the firmware.
-const FAULTS: [(&str, Fault); 10] = [
-    ("NOT_FINITE", Fault::NotFinite),
-    ("ANGLE", Fault::Angle),
-    ("RAIL", Fault::Rail),
-    ("SPEED", Fault::Speed),
-    ("ENCODER", Fault::Encoder),
-    ("FROZEN", Fault::Frozen),
-    ("MOTOR", Fault::Motor),
-    ("DISTURBED", Fault::Disturbed),
-    ("SATURATED", Fault::Saturated),
-    ("TABLE", Fault::Table),
-];
 
 /// Why a rig cannot have a C header.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -52,15 +42,21 @@ pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
     let name = plain(&rig.name);
     let title = format!("Controller of the rig \"{name}\", written by `upright export --c`; do not edit.");
     let steps = if table.steps.is_some() { STEPS } else { "" };
-    let mut out = format!("/* {title}\n\n{HEAD}{steps}*/\n\n");
+    let readings = Readings::of(rig);
+    let absolute = readings.comment();
+    let mut out = format!("/* {title}\n\n{HEAD}{}{absolute}{steps}*/\n\n", calling::comment());
     out += "#ifndef UPRIGHT_CONTROLLER_H\n#define UPRIGHT_CONTROLLER_H\n\n";
     // Writing into a String cannot fail.
-    let _ = constants(&mut out, &name, table);
+    let _ = constants(&mut out, &name, table, readings.are_absolute());
+    out += &faults::enumeration();
     out.push_str(COMPILER);
     out += &format!(
         "static const upright_table_type upright_table = {{\n{}}};\n\n",
-        initializer(table, observer)
+        initializer(table, observer, &readings)
     );
+    out.push_str(STATE);
+    out += &faults::functions(table.steps.is_some());
+    out.push_str(READINGS);
     out.push_str(PARTS);
     out.push_str(if table.thresholds.survives_pushes() { TESTS_OF_PUSHES } else { TESTS_OF_SIZES });
     out.push_str(CALLS);
@@ -75,8 +71,8 @@ fn plain(name: &str) -> String {
 
 type WidestObserver = ObserverGains<MAX_STATES, MAX_SENSORS>;
 
-/// The preprocessor's constants, and the faults.
-fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Result {
+/// The preprocessor's constants.
+fn constants(out: &mut String, name: &str, table: &TableValues, is_absolute: bool) -> core::fmt::Result {
     let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
     let pattern = match table.observer.as_ref().map(WidestObserver::pattern) {
         Some(PredictionPattern::Frictionless) if table.states() % 2 == 0 => 2,
@@ -107,28 +103,8 @@ fn constants(out: &mut String, name: &str, table: &TableValues) -> core::fmt::Re
     define("HAS_PUSHES", u8::from(table.thresholds.survives_pushes()).to_string())?;
     define("HAS_FRICTION", u8::from(table.friction.is_some()).to_string())?;
     define("PATTERN", format!("{pattern} /* of Ad: see upright_predict_state */"))?;
-    writeln!(
-        out,
-        "\n/* Why the motor was turned off; the codes are those of the firmware. */\ntypedef enum {{"
-    )?;
-    writeln!(out, "    UPRIGHT_NO_FAULT = 0,")?;
-    for (name, fault) in FAULTS {
-        writeln!(out, "    UPRIGHT_{name} = {}, /* {} */", fault.code(), condition(fault))?;
-    }
-    writeln!(out, "    UPRIGHT_CALLER = 100, /* upright_trip() */")?;
-    writeln!(
-        out,
-        "    UPRIGHT_ARITHMETIC = 101 /* processor or compiler do not round as IEEE single precision */"
-    )?;
-    writeln!(out, "}} upright_fault;\n")
-}
-
-/// When a fault is raised, in a word or two.
-fn condition(fault: Fault) -> &'static str {
-    match fault {
-        Fault::Table => "the table has other values than those exported",
-        fault => fault.entry().name,
-    }
+    define("HAS_ABSOLUTE", u8::from(is_absolute).to_string())?;
+    writeln!(out)
 }
 
 /// Whether a sensor's reading is old.
@@ -137,7 +113,7 @@ fn has_delay(observer: &WidestObserver) -> bool {
 }
 
 /// The members of `upright_table_type`, in the order of their declaration.
-fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
+fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readings) -> String {
     let (states, sensors) = (table.states(), table.sensors());
     let mut out = Initializer::new();
     out.line("    {");
@@ -183,6 +159,13 @@ fn initializer(table: &TableValues, observer: &WidestObserver) -> String {
     out.counts("slow_counts", &table.limits.slow_counts[..sensors]);
     out.counts("rest_counts", &table.limits.rest_counts[..sensors]);
     out.counts("turn_counts", &table.limits.turn_counts[..sensors]);
+    let steps = observer.step.data.0[0][..sensors].iter().enumerate();
+    let furthest = |(sensor, &step): (usize, &f32)| {
+        // Saturates: nothing is too far.
+        furthest_counts(&table.limits, sensor, step, table.tick_s) as i32
+    };
+    out.counts("furthest_counts", &steps.map(furthest).collect::<Vec<_>>());
+    readings.initialise(&mut out);
     out.sealed()
 }
 
@@ -200,6 +183,7 @@ fn law(out: &mut Initializer, gains: &LawGains<MAX_STATES>, states: usize) {
 fn supervision(out: &mut Initializer, table: &TableValues) {
     let (limits, thresholds, sensors) = (&table.limits, &table.thresholds, table.sensors());
     out.floats("rail_m", limits.rail_m);
+    out.floats("setpoints_m", limits.setpoints_m());
     out.float("angle_rad", limits.angle_rad);
     out.float("speed_m_per_s", limits.speed_m_per_s);
     out.float("arm_angle_rad", limits.arm_angle_rad);

@@ -42,15 +42,28 @@ UPRIGHT_CALL void upright_init(upright_controller *c)
 }
 
 /* Declares that the counters read `raw` at the positions `counts`; upright_table.rest_counts: the links hang at rest
-   and the cart is in the middle. With pulses, energize the motor before. Refused while armed, balancing or after a
-   fault. */
+   and the cart is in the middle. With pulses, energize the motor before. Refused while armed, balancing, braking or
+   after a fault, and in the dead band of a potentiometer. */
 UPRIGHT_CALL bool upright_home(upright_controller *c, const uint32_t *raw, const int32_t *counts)
 {
-    if (c->state > UPRIGHT_READY) {
+#if UPRIGHT_HAS_ABSOLUTE
+    uint32_t used[UPRIGHT_SENSORS];
+    raw = upright_used_bits(raw, used);
+#endif
+    bool is_possible = c->state == UPRIGHT_NOT_HOMED || c->state == UPRIGHT_READY;
+    for (uint8_t i = 0; i < UPRIGHT_SENSORS; i++) {
+        is_possible = is_possible && !upright_is_dead(raw, i);
+    }
+#if UPRIGHT_HAS_STEPS
+    is_possible = is_possible && !c->is_controlled && !c->is_braking;
+#endif
+    if (!is_possible) {
         return false;
     }
     memcpy(c->last, raw, sizeof c->last);
     memcpy(c->counts, counts, sizeof c->counts);
+    c->jumps = 0;
+    c->loses_positions = false;
     c->state = UPRIGHT_READY;
     return true;
 }
@@ -65,10 +78,10 @@ UPRIGHT_CALL bool upright_select(upright_controller *c, uint8_t law)
     return true;
 }
 
-/* Requests a position of the cart (m), within the soft limits of the rail. */
+/* Requests a position of the cart (m), within upright_table.setpoints_m: on its way, the cart goes beyond it. */
 UPRIGHT_CALL bool upright_set_setpoint(upright_controller *c, float position_m)
 {
-    if (!(position_m >= upright_table.rail_m[0] && position_m <= upright_table.rail_m[1])) {
+    if (!(position_m >= upright_table.setpoints_m[0] && position_m <= upright_table.setpoints_m[1])) {
         return false;
     }
     c->target_m = position_m;
@@ -76,12 +89,13 @@ UPRIGHT_CALL bool upright_set_setpoint(upright_controller *c, float position_m)
     return true;
 }
 
-/* Arms, if the rig is homed, its links are upright and its cart is within the soft limits. */
+/* Arms, if the rig is homed, its links are upright and its cart is where it may be told to stand. */
 UPRIGHT_CALL bool upright_arm(upright_controller *c)
 {
     int32_t upright[UPRIGHT_SENSORS];
     upright_unwind(c->counts, upright);
-    if (c->state != UPRIGHT_READY || upright_lean(upright) > upright_table.arm_angle_rad || upright_is_off_centre(c)) {
+    bool is_ready = c->state == UPRIGHT_READY && c->jumps == 0 && !c->tripped && !c->at_switch;
+    if (!is_ready || upright_lean(upright) > upright_table.arm_angle_rad || upright_is_off_centre(c)) {
         return false;
     }
     upright_restart_slow(c);
@@ -101,34 +115,69 @@ UPRIGHT_CALL void upright_disarm(upright_controller *c)
     c->requested_n = c->applied_n = 0.0f;
 }
 
-/* Turns the motor off until upright_clear(): limit switch, emergency stop, supply, a tick that came late ... */
-UPRIGHT_CALL void upright_trip(upright_controller *c) { upright_trip_at(c, UPRIGHT_CALLER, 0); }
+/* Turns the motor off until upright_clear(), at the latest from the next upright_control() on: emergency stop, supply,
+   a tick that came late ... From anywhere, interrupts too. Pulses end at once. */
+UPRIGHT_CALL void upright_trip(upright_controller *c) { c->tripped = 1; }
+
+/* The same for a limit switch of the rail, after which pulses bring the cart to rest. */
+UPRIGHT_CALL void upright_trip_at_switch(upright_controller *c) { c->at_switch = 1; }
+
+/* Whether the power stage is to be on: while balancing, and with pulses also while they hold or brake the cart. */
+UPRIGHT_CALL bool upright_motor_is_on(const upright_controller *c)
+{
+#if UPRIGHT_HAS_STEPS
+    bool holds = c->state == UPRIGHT_READY || c->state == UPRIGHT_ARMED || c->state == UPRIGHT_BALANCING;
+    return !c->tripped && (holds || c->is_controlled || c->is_braking);
+#else
+    return !c->tripped && !c->at_switch && c->state == UPRIGHT_BALANCING;
+#endif
+}
 
 /* Clears a fault. After one of an encoder, the rig has to be homed again; with pulses, after any. */
 UPRIGHT_CALL bool upright_clear(upright_controller *c)
 {
-    if (c->state != UPRIGHT_FAULT || c->fault == UPRIGHT_TABLE || c->fault == UPRIGHT_ARITHMETIC) {
-        return c->state != UPRIGHT_FAULT;
+    if (c->fault == UPRIGHT_TABLE || c->fault == UPRIGHT_ARITHMETIC) {
+        return false;
     }
-    bool loses_positions = UPRIGHT_HAS_STEPS || c->fault == UPRIGHT_ENCODER || c->fault == UPRIGHT_FROZEN;
-    c->state = loses_positions ? UPRIGHT_NOT_HOMED : UPRIGHT_READY;
+    if (c->state != UPRIGHT_FAULT) {
+        return !c->tripped && !c->at_switch;
+    }
+    /* First: a trip that comes from here on is another one. */
+    c->tripped = 0;
+    c->at_switch = 0;
+    c->state = c->loses_positions ? UPRIGHT_NOT_HOMED : UPRIGHT_READY;
     c->fault = UPRIGHT_NO_FAULT;
     return true;
 }
 
-/* First half of a tick: from the readings of the counters to the duty cycle, or to the pulses of this tick. Drive the
-   motor with it at once; 0 and c->state != UPRIGHT_BALANCING: turn it off. */
-UPRIGHT_CALL upright_drive upright_control(upright_controller *c, const uint32_t *raw)
+/* A tick with the law off: takes the readings. In a tick in which one cannot be, none is taken; after the third in a
+   row, nobody knows where the rig is. */
+static inline void upright_follow(upright_controller *c, const uint32_t *raw)
+{
+    float y[UPRIGHT_SENSORS];
+    bool is_homed = c->state != UPRIGHT_NOT_HOMED && !c->loses_positions;
+    uint8_t jumped = is_homed ? upright_find_jump(c, raw) : UPRIGHT_SENSORS;
+    if (jumped == UPRIGHT_SENSORS) {
+        c->jumps = 0;
+        upright_measure(c, raw, y);
+        if (c->state == UPRIGHT_ARMED) {
+            upright_wait(c);
+        }
+        return;
+    }
+    upright_restart_slow(c);
+    upright_count(&c->rejected, true);
+    c->jumps++;
+    if (c->jumps >= 3) {
+        upright_trip_at(c, UPRIGHT_ENCODER, jumped);
+    }
+}
+
+/* A tick of balancing, up to the output of the law. */
+static inline upright_drive upright_balance(upright_controller *c, const uint32_t *raw)
 {
     float y[UPRIGHT_SENSORS];
     upright_measure(c, raw, y);
-    if (c->state == UPRIGHT_ARMED) {
-        upright_wait(c);
-        upright_measure(c, raw, y);
-    }
-    if (c->state != UPRIGHT_BALANCING) {
-        return 0;
-    }
 #if UPRIGHT_HAS_STEPS
     y[0] -= upright_table.lag_s * upright_speed(c);
 #endif
@@ -148,10 +197,34 @@ UPRIGHT_CALL upright_drive upright_control(upright_controller *c, const uint32_t
         upright_trip_at(c, of_sensors, sensor);
     } else if (c->saturated > upright_table.saturated_ticks) {
         upright_trip_at(c, UPRIGHT_SATURATED, 0);
-    } else {
-        return drive;
     }
-    return 0;
+    return drive;
+}
+
+/* First half of a tick: from the readings of the sensors to the duty cycle, or to the pulses of this tick. Drive the
+   motor with it at once, if upright_motor_is_on(); else turn it off. Call it every tick from upright_home() on: a
+   sensor that moves further between two calls than a cart or a link can in a tick is a fault, motor on or off. */
+UPRIGHT_CALL upright_drive upright_control(upright_controller *c, const uint32_t *raw)
+{
+    upright_drive drive = 0;
+#if UPRIGHT_HAS_ABSOLUTE
+    uint32_t used[UPRIGHT_SENSORS];
+    raw = upright_used_bits(raw, used);
+#endif
+    if (c->state != UPRIGHT_BALANCING) {
+        upright_follow(c, raw);
+    }
+    if (c->state == UPRIGHT_BALANCING) {
+        drive = upright_balance(c, raw);
+    }
+    /* Last: whenever an interrupt has called upright_trip(), here it is seen. */
+    if (c->at_switch) {
+        upright_trip_at(c, UPRIGHT_LIMIT_SWITCH, 0);
+    }
+    if (c->tripped) {
+        upright_trip_at(c, UPRIGHT_CALLER, 0);
+    }
+    return c->state == UPRIGHT_BALANCING ? drive : upright_idle(c);
 }
 
 /* Second half of a tick, any time before the next one: the prediction. */

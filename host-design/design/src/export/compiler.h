@@ -83,7 +83,8 @@ typedef struct {
     float lag_s, lead_s; /* of a drive that follows late; speed that is commanded above the cart's, per acceleration */
 #endif
     /* Limits. */
-    float rail_m[2], angle_rad, speed_m_per_s, arm_angle_rad;
+    float rail_m[2], setpoints_m[2]; /* soft limits of the rail; where the cart may be told to stand */
+    float angle_rad, speed_m_per_s, arm_angle_rad;
     /* Thresholds of the tests of the innovation. */
     float innovation[UPRIGHT_SENSORS];
     float frozen[UPRIGHT_SENSORS];
@@ -94,6 +95,11 @@ typedef struct {
     int32_t slow_counts[UPRIGHT_SENSORS];
     int32_t rest_counts[UPRIGHT_SENSORS]; /* readings while the links hang and the cart is at 0 */
     int32_t turn_counts[UPRIGHT_SENSORS];
+    int32_t furthest_counts[UPRIGHT_SENSORS]; /* in a tick, with the motor off */
+#if UPRIGHT_HAS_ABSOLUTE
+    /* Of absolute sensors: counts in a turn, less 1; bits of a reading that are too fine; lowest and highest one. */
+    uint32_t range[UPRIGHT_SENSORS], unused_bits[UPRIGHT_SENSORS], readings[UPRIGHT_SENSORS][2];
+#endif
     uint32_t checksum;
 } upright_table_type;
 

@@ -61,6 +61,16 @@ impl Initializer {
         self.member(name, &format!("{{{}}}", literals.join(", ")));
     }
 
+    /// An array of pairs of indices.
+    pub(super) fn pairs(&mut self, name: &str, values: impl Iterator<Item = [u32; 2]>) {
+        let literal = |[low, high]: [u32; 2]| {
+            self.words.extend([low, high]);
+            format!("{{{low}ul, {high}ul}}")
+        };
+        let literals: Vec<String> = values.map(literal).collect();
+        self.member(name, &format!("{{{}}}", literals.join(", ")));
+    }
+
     /// The text, with the checksum of all words at its end: FNV-1a, word by word.
     pub(super) fn sealed(self) -> String {
         let hash =

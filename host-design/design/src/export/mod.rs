@@ -4,7 +4,12 @@
 //! precision, in the order of `upright`. What the compiler must not change is checked where the header is compiled, and
 //! again when the program starts.
 
+mod absolute;
 mod c_header;
+mod calling;
+mod faults;
 mod initializer;
 
 pub use c_header::{NoHeader, c_header};
+pub use calling::CALLING;
+pub use faults::{HeaderFault, header_faults};

@@ -7,6 +7,7 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_test_support::limits::output;
+use upright_design::export::{CALLING, header_faults};
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
 use upright_tool::image::{BoardName, CODE_LIMIT, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, RAM_LIMIT};
@@ -61,6 +62,30 @@ fn faults() -> String {
         );
     }
     table
+}
+
+/// How often a light blinks for the faults of the C header.
+fn blinks() -> String {
+    let mut rows: Vec<(u8, Vec<String>, Vec<&str>)> = Vec::new();
+    for fault in header_faults() {
+        if rows.last().is_none_or(|(blinks, ..)| *blinks != fault.blinks) {
+            rows.push((fault.blinks, Vec::new(), Vec::new()));
+        }
+        let (_, codes, conditions) = rows.last_mut().unwrap();
+        codes.push(fault.code.to_string());
+        conditions.push(fault.condition);
+    }
+    let row = |(blinks, codes, conditions): (u8, Vec<String>, Vec<&str>)| {
+        format!("| {blinks} | {} | {} |\n", codes.join(", "), conditions.join("; "))
+    };
+    "| blinks | `c.fault` | fault |\n|---|---|---|\n".to_owned()
+        + &rows.into_iter().map(row).collect::<String>()
+}
+
+/// From where the functions of the C header may be called.
+fn calling() -> String {
+    let row = |(functions, from): (&[&str], &str)| format!("| `{}` | {from} |\n", functions.join("`, `"));
+    "| function | from |\n|---|---|\n".to_owned() + &CALLING.into_iter().map(row).collect::<String>()
 }
 
 fn inhibits() -> String {
@@ -122,6 +147,12 @@ fn the_page_about_faults_holds_the_order_within_a_tick() {
 #[test]
 fn the_page_about_faults_holds_the_reasons_against_a_command() {
     hold("docs/faults.md", "inhibits", &inhibits());
+}
+
+#[test]
+fn the_page_about_the_c_header_holds_what_a_light_blinks_and_what_may_interrupt_what() {
+    hold("docs/c-header.md", "blinks", &blinks());
+    hold("docs/c-header.md", "calling", &calling());
 }
 
 #[test]
