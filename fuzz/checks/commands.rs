@@ -197,9 +197,9 @@ fn hash(bytes: &[u8]) -> u16 {
     (bytes.iter().fold(0x811c_9dc5, mix) >> 16) as u16
 }
 
-/// Set-points: 0, the ends of the rail and just beyond, numbers that are not finite, and some others.
+/// Set-points: 0, the ends of their range and just beyond, numbers that are not finite, and some others.
 fn setpoint(which: u8) -> f32 {
-    let [low, high] = TABLE.limits.rail_m;
+    let [low, high] = TABLE.limits.setpoints_m();
     let edges = [0.0, -0.0, low, high, low.next_down(), high.next_up(), f32::INFINITY, f32::NEG_INFINITY];
     let edges = edges.into_iter().chain([f32::NAN, f32::MAX, f32::MIN_POSITIVE, 0.1, -0.1, 1.0, -1.0]);
     edges.into_iter().nth(usize::from(which % 15)).unwrap_or_default()

@@ -185,7 +185,7 @@ impl Invariants {
         let Some(counts) = self.counts.back() else { panic!("a tick has counts") };
         let step = |sensor: usize| TABLE.observer.as_ref().map_or(0.0, |observer| observer.step[sensor]);
         let position_m = step(0) * counts[0] as f32;
-        let [low, high] = limits.rail_m;
+        let [low, high] = limits.setpoints_m();
         assert!((low..=high).contains(&position_m), "armed off centre");
         let mut angle = 0.0;
         for (sensor, (&count, &turn)) in counts.iter().zip(&limits.turn_counts).enumerate().skip(1) {
@@ -203,14 +203,14 @@ impl Invariants {
     }
 }
 
-/// An accepted set-point is finite and on the rail, and so is the one that the law follows.
+/// An accepted set-point is finite and far enough from the ends of the rail, and the one that the law follows is on it.
 fn setpoint(firmware: &Tested, answered: Option<&(Request, Answer)>) {
-    let [low, high] = TABLE.limits.rail_m;
+    let [low, high] = TABLE.limits.setpoints_m();
     if let Some((Request::Setpoint(wanted), answer)) = answered {
         let good = (low..=high).contains(wanted);
         assert_eq!(*answer == Answer::Done, good, "set-point {wanted}: {answer:?}");
     }
-    let controller = firmware.controller();
+    let ([low, high], controller) = (TABLE.limits.rail_m, firmware.controller());
     for setpoint in [controller.setpoint(), controller.law_state().setpoint] {
         assert!((low..=high).contains(&setpoint), "set-point {setpoint}");
     }

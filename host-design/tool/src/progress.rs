@@ -15,7 +15,7 @@ const LINE_EVERY: Duration = Duration::from_secs(8);
 /// Runs `work` with a spinner on stderr.
 pub fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     if !stderr().is_terminal() {
-        let stage = Mutex::new(Stage::begin(message, 0));
+        let stage = Mutex::new(ProgressStage::begin(message, 0));
         return with_lines(LINE_EVERY, &|line| eprintln!("{line}"), &stage, work);
     }
     let spinner = ProgressBar::new_spinner().with_message(message);
@@ -28,7 +28,7 @@ pub fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
 /// Runs `work` with a bar on stderr that names its stages and counts their steps. In a search, it also says how many
 /// candidates are solved, and how good the best is.
 pub fn with_progress<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
-    let stage = Mutex::new(Stage::begin("", 0));
+    let stage = Mutex::new(ProgressStage::begin("", 0));
     if !stderr().is_terminal() {
         let report = |line: &str| eprintln!("{line}");
         return with_lines(LINE_EVERY, &report, &stage, || work(&|step| locked(&stage).take(step)));
@@ -61,7 +61,7 @@ pub fn with_bar<T>(stage: &str, steps: u64, work: impl FnOnce(&(dyn Fn() + Sync)
 }
 
 /// A stage of a computation, and how far it is.
-struct Stage {
+struct ProgressStage {
     name: String,
     done: u64,
     /// Number of steps; 0 if it is not known.
@@ -71,7 +71,7 @@ struct Stage {
     since: Instant,
 }
 
-impl Stage {
+impl ProgressStage {
     fn begin(name: &str, steps: u64) -> Self {
         Self { name: name.to_owned(), done: 0, steps, solved: (0, f64::INFINITY), since: Instant::now() }
     }
@@ -113,7 +113,7 @@ impl Stage {
     }
 }
 
-fn locked(stage: &Mutex<Stage>) -> MutexGuard<'_, Stage> {
+fn locked(stage: &Mutex<ProgressStage>) -> MutexGuard<'_, ProgressStage> {
     stage.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -121,7 +121,7 @@ fn locked(stage: &Mutex<Stage>) -> MutexGuard<'_, Stage> {
 fn with_lines<T>(
     every: Duration,
     report: &(dyn Fn(&str) + Sync),
-    stage: &Mutex<Stage>,
+    stage: &Mutex<ProgressStage>,
     work: impl FnOnce() -> T,
 ) -> T {
     thread::scope(|scope| {
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn long_work_is_reported_line_by_line_and_short_work_is_not() {
         let lines = Mutex::new(Vec::new());
-        let stage = Mutex::new(Stage::begin("building", 0));
+        let stage = Mutex::new(ProgressStage::begin("building", 0));
         let report = |line: &str| lines.lock().unwrap().push(line.to_owned());
         // The work ends only after two lines have come.
         let seen = || lines.lock().unwrap().len();
@@ -164,8 +164,8 @@ mod tests {
 
     #[test]
     fn a_line_tells_what_is_done_and_what_is_left() {
-        let mut stage = Stage::begin("designing", 0);
-        let after = |stage: &Stage, seconds| stage.line(Duration::from_secs(seconds));
+        let mut stage = ProgressStage::begin("designing", 0);
+        let after = |stage: &ProgressStage, seconds| stage.line(Duration::from_secs(seconds));
         assert_eq!(after(&stage, 9), "designing: 9 s so far");
         stage.take(ProgressStep::Begin("trajectories", 40));
         assert_eq!(after(&stage, 8), "trajectories: 0 of 40, 8 s so far");

@@ -90,7 +90,7 @@ fn gains_that_the_page_for_users_of_matlab_prints_are_those_of_the_design() {
 /// The page says so: pulses are a constant speed in a tick, which is no acceleration that is held.
 #[test]
 fn a_stepper_has_other_gains_than_its_plant_with_a_held_acceleration() {
-    assert!(PAGE.contains("A stepper holds its speed within a tick, not its acceleration"));
+    assert!(PAGE.contains("Those of a stepper, and its gains, differ: it holds its speed"));
     let text = with_lqr(&rig_file("single-stepper.toml"), "cost = \"sum\"");
     let text = text.replace("period_s = 0.01", "period_s = 0.03");
     let [_, sampled] = gains(&text);
