@@ -28,7 +28,8 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
 {
     /// The task before its first tick. If the board's timer is set to another tick than the gain table is for, or the
     /// table's drive needs pulses that the board does not give, the motor stays off:
-    /// [`Fault::Table`](crate::supervision::fault::Fault::Table). `commands` and `messages` lead from and to the serial
+    /// [`Fault::Table`](crate::supervision::fault::Fault::Table); if its image is damaged,
+    /// [`Fault::Image`](crate::supervision::fault::Fault::Image). `commands` and `messages` lead from and to the serial
     /// link.
     pub fn new(
         mut firmware: Firmware<'t, NX, NY, S>,
@@ -36,7 +37,9 @@ impl<'q, 't, B: Board<NY>, const NX: usize, const NY: usize, S: SwingUp<NX, NY>>
         commands: Consumer<'q, Command>,
         messages: Producer<'q, Message<NX, NY>>,
     ) -> Self {
-        firmware.compare_board(board.tick_s(), B::GIVES_PULSES, B::CHECKS_TABLES);
+        // The first fault is the one that is latched.
+        firmware.compare_memory(B::CHECKS_TABLES, board.image_is_damaged());
+        firmware.compare_board(board.tick_s(), B::GIVES_PULSES);
         Self { firmware, board, commands, messages, cycles: 0 }
     }
 

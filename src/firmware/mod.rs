@@ -132,8 +132,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// [`Reset`](crate::protocol::message::Reset). Without swing-up, `swing_up` is [`NoSwingUp`].
     ///
     /// There is a firmware for every table: if one is damaged, [`Fault::Table`] is latched, cannot be cleared, and is
-    /// reported to the host. So is [`Fault::Image`] of a damaged image. To know before, call [`GainTable::check`] and
-    /// [`SwingUp::check`].
+    /// reported to the host. To know before, call [`GainTable::check`] and [`SwingUp::check`].
     // Returns no `Result`, which would put a copy of the firmware on the stack.
     #[inline(never)]
     pub fn new(
@@ -145,13 +144,13 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let start = start.into();
         let are_sound = swing_up.check(table).is_ok() && table.check().is_ok();
         let (controller, is_usable) = match Controller::with_checked(table, widths) {
-            Ok(controller) if are_sound => (controller, !start.is_damaged),
+            Ok(controller) if are_sound => (controller, true),
             _ => (Controller::unusable(table, widths), false),
         };
         let at_start = |fault| Cause { fault, tick: 0, sensor: None };
         let mut supervisor = Supervisor::new(start.reset.fault().map(at_start));
         if !is_usable {
-            supervisor.trip(at_start(if start.is_damaged { Fault::Image } else { Fault::Table }));
+            supervisor.trip(at_start(Fault::Table));
         }
         // The new firmware is not changed after this expression: that would make a copy, which needs a quarter of the
         // board's stack.
@@ -198,16 +197,26 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// Takes the tick of the board's timer (s), and whether the board gives pulses and checks the tables. If the tick
-    /// is not the table's, or pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
+    /// Takes the tick of the board's timer (s), and whether the board gives pulses. If the tick is not the table's, or
+    /// pulses are missing, [`Fault::Table`] is latched, cannot be cleared, and
     /// [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
-    pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool, checks_tables: bool) {
-        self.board_checks_tables = checks_tables;
+    pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool) {
         let difference = f32::abs(timer_tick_s - self.table.tick_s);
         let lacks_pulses = self.table.steps.is_some() && !gives_pulses;
         if lacks_pulses || difference.is_nan() || difference > TICK_TOLERANCE * self.table.tick_s {
             (self.timer_tick_s, self.is_usable) = (timer_tick_s, false);
             self.trip(Fault::Table, None);
+        }
+    }
+
+    /// Takes whether the board checks the tables, and whether it has found its image damaged: then [`Fault::Image`] is
+    /// latched, and cannot be cleared.
+    #[inline]
+    pub(crate) fn compare_memory(&mut self, checks_tables: bool, image_is_damaged: bool) {
+        self.board_checks_tables = checks_tables;
+        if image_is_damaged {
+            self.is_usable = false;
+            self.trip(Fault::Image, None);
         }
     }
 

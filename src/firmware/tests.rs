@@ -342,20 +342,16 @@ impl<const PULSES: bool> Board<SENSORS> for Timed<PULSES> {
 
 #[test]
 fn a_damaged_image_never_arms_and_says_so() {
-    let mut image = [7; 64];
-    image[32..36].copy_from_slice(&crate::flash_image::checksum(&[7; 64]).to_le_bytes());
-    let mut start = Start::from(Reset::Power);
-    start.compare_image(&image);
-    assert!(!start.is_damaged && start.image != 0);
-    let of = |start| Firmware::new(&TABLE, &NoSwingUp, [CounterWidth::Bits32; SENSORS], start);
-    assert_eq!(of(start).state(), State::Disarmed);
-    image[63] ^= 1;
-    start.compare_image(&image);
-    let mut firmware = of(start);
-    assert_eq!((firmware.state(), firmware.supervisor.fault()), (State::Fault, Some(Fault::Image)));
-    firmware.control(&INPUTS);
-    let (_, reply) = firmware.finish(Some(&Command { id: 1, request: Request::Clear }), 0);
-    assert_eq!(reply.map(|reply| reply.answer), Some(Answer::NotNow(Inhibits::TABLE)));
+    for is_damaged in [false, true] {
+        let mut firmware = firmware(&TABLE, Reset::Power);
+        firmware.compare_memory(true, is_damaged);
+        firmware.compare_board(TICK_S, false);
+        firmware.control(&INPUTS);
+        let (_, reply) = firmware.finish(Some(&Command { id: 1, request: Request::Clear }), 0);
+        let answer = if is_damaged { Answer::NotNow(Inhibits::TABLE) } else { Answer::Done };
+        assert_eq!(reply.map(|reply| reply.answer), Some(answer));
+        assert_eq!(firmware.supervisor.fault(), is_damaged.then_some(Fault::Image));
+    }
 }
 
 /// The latched fault after Clear, and the tick that the firmware reports, on a board with this tick.

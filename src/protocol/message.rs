@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::Contacts;
 use crate::control::controller::Rejected;
-use crate::flash_image;
 use crate::protocol::tick_log::TickLog;
 use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::Homing;
@@ -180,16 +179,6 @@ pub struct Start {
     pub crash: Option<CrashRecord>,
     /// As [`Info::image`].
     pub image: u32,
-    /// Whether the image in flash has another checksum than the one that was written into it when it was linked.
-    pub is_damaged: bool,
-}
-
-impl Start {
-    /// Compares `image`, all of it as it is in flash, with the [checksum](crate::flash_image) in its vector table.
-    pub fn compare_image(&mut self, image: &[u8]) {
-        self.image = flash_image::checksum(image);
-        self.is_damaged = self.image != flash_image::reference(image);
-    }
 }
 
 impl From<Reset> for Start {

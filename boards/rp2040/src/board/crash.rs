@@ -5,6 +5,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use hal::pac::WATCHDOG;
+use upright::flash_image::WordSums;
 use upright::protocol::message::{CrashRecord, Reset, Start};
 
 /// Mark of a crash that caused the last reset, and of an older one.
@@ -18,8 +19,8 @@ unsafe extern "C" {
     static __vector_table: u32;
 }
 
-/// Why the program started, and the record of the last crash since power-on.
-pub(super) fn start(watchdog: &WATCHDOG) -> Start {
+/// Why the program started, and the record of the last crash since power-on; and whether the image is damaged.
+pub(super) fn start(watchdog: &WATCHDOG) -> (Start, bool) {
     let mark = watchdog.scratch0().read().bits();
     let record = [watchdog.scratch1().read().bits(), watchdog.scratch2().read().bits(), 0, 0, 0];
     if mark == NEW {
@@ -33,19 +34,18 @@ pub(super) fn start(watchdog: &WATCHDOG) -> Start {
         _ => Reset::Power,
     };
     let crash = matches!(mark, NEW | OLD).then_some(CrashRecord(record));
-    let mut start = Start { reset, crash, ..Start::default() };
-    start.compare_image(image());
-    start
+    let image = WordSums::of_image(words());
+    (Start { reset, crash, image: image.weighted }, image != WordSums::carried_by(words()))
 }
 
 /// The image in flash, from its vector table on: the boot ROM checks what an RP2040 has before it.
-fn image() -> &'static [u8] {
+fn words() -> &'static [u32] {
     // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
     unsafe {
         let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
         let end = (&raw const __sidata) as usize + values;
-        let begin = (&raw const __vector_table).cast::<u8>();
-        core::slice::from_raw_parts(begin, end - begin as usize)
+        let begin = &raw const __vector_table;
+        core::slice::from_raw_parts(begin, (end - begin as usize) / 4)
     }
 }
 

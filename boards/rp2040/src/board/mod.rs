@@ -56,6 +56,7 @@ pub(crate) struct Hardware {
     watchdog: Watchdog,
     /// Ticks of the timer that were over before the tick had ended.
     wraps: u32,
+    image_is_damaged: bool,
     overrun: bool,
     /// Whether the limit switches were open at the end of the previous tick.
     limits: [bool; 2],
@@ -63,7 +64,7 @@ pub(crate) struct Hardware {
 
 /// Sets up all peripherals but the watchdog, with the motor off. Also returns what the board knows about the start.
 pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Hardware, SerialLine, Start) {
-    let start = crash::start(&device.WATCHDOG);
+    let (start, image_is_damaged) = crash::start(&device.WATCHDOG);
     let mut resets = device.RESETS;
     pins::set_up(&resets, &device.PADS_BANK0, &device.IO_BANK0);
     let mut watchdog = Watchdog::new(device.WATCHDOG);
@@ -92,6 +93,7 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
         supply,
         watchdog,
         wraps: 0,
+        image_is_damaged,
         overrun: false,
         limits: [false; 2],
     };
@@ -108,6 +110,10 @@ impl Hardware {
 impl Board<SENSORS> for Hardware {
     const WIDTHS: [CounterWidth; SENSORS] = [CounterWidth::Bits32; SENSORS];
     const GIVES_PULSES: bool = GIVES_PULSES;
+
+    fn image_is_damaged(&self) -> bool {
+        self.image_is_damaged
+    }
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         // Clears the flag of the current tick.

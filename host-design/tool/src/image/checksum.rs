@@ -6,14 +6,20 @@ use std::path::Path;
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, Object, ObjectSection};
 use sha2::{Digest, Sha256};
-use upright::flash_image::{REFERENCE_WORD, checksum};
+use upright::flash_image::{REFERENCE, WordSums};
 use upright_board::Image;
 
 use super::elf::{ElfError, ImageChip};
 
 /// Checksum of what an image puts into flash: the firmware's [`Info::image`](upright::protocol::message::Info::image).
 pub fn flash_checksum(image: &Image) -> u32 {
-    checksum(&image.flash())
+    of_image(&image.flash()).weighted
+}
+
+/// The checksum of the `bytes` of an image.
+fn of_image(bytes: &[u8]) -> WordSums {
+    let words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    WordSums::of_image(&words)
 }
 
 /// The ELF file `elf` with the [checksum](upright::flash_image) of its image in the vector table. Without it, the
@@ -27,7 +33,7 @@ pub(super) fn with_reference(path: &Path, mut elf: Vec<u8>) -> Result<Vec<u8>, E
     let file = ElfFile32::<Endianness>::parse(&elf[..]).map_err(format)?;
     let table = file.section_by_name(".vector_table").ok_or_else(|| missing("section .vector_table"))?;
     let (begin, mut place) = (table.address(), None);
-    let (mut flash, word) = (Vec::new(), begin + 4 * REFERENCE_WORD as u64);
+    let (mut flash, word) = (Vec::new(), begin + 4 * REFERENCE.start as u64);
     for segment in file.elf_program_headers() {
         let address = u64::from(segment.p_paddr(file.endian()));
         let bytes = segment.data(file.endian(), &elf[..]).unwrap_or_default();
@@ -48,8 +54,10 @@ pub(super) fn with_reference(path: &Path, mut elf: Vec<u8>) -> Result<Vec<u8>, E
         }
     }
     let place =
-        place.filter(|place| place + 4 <= elf.len()).ok_or_else(|| missing("vector table in flash"))?;
-    elf[place..place + 4].copy_from_slice(&checksum(&flash).to_le_bytes());
+        place.filter(|place| place + 8 <= elf.len()).ok_or_else(|| missing("vector table in flash"))?;
+    let WordSums { plain, weighted } = of_image(&flash);
+    elf[place..place + 4].copy_from_slice(&plain.to_le_bytes());
+    elf[place + 4..place + 8].copy_from_slice(&weighted.to_le_bytes());
     Ok(elf)
 }
 

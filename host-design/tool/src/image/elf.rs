@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+use upright::flash_image::REFERENCE;
 
 /// A file that is not an image of this firmware.
 #[derive(Debug, thiserror::Error)]
@@ -234,11 +235,14 @@ impl LinkedImage {
     }
 }
 
-/// The handlers in a vector table: number and address.
+/// The handlers in a vector table: number and address. Two words hold the image's checksum.
 fn handlers(table: &[u8]) -> Vec<(usize, u32)> {
     let (words, _) = table.as_chunks::<4>();
     let words = words.iter().map(|word| u32::from_le_bytes(*word)).enumerate().skip(1);
-    words.filter(|(_, word)| *word != 0).map(|(number, word)| (number, word & !1)).collect()
+    words
+        .filter(|(number, word)| *word != 0 && !REFERENCE.contains(number))
+        .map(|(number, word)| (number, word & !1))
+        .collect()
 }
 
 /// Addresses and bytes of the sections of code.

@@ -1,5 +1,6 @@
 //! The image in QEMU: pins and serial line as files of the emulator, or as serial lines.
 
+mod answer_limit;
 mod channels;
 mod error;
 #[cfg(unix)]
@@ -8,6 +9,7 @@ mod fifos;
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempDir;
 use upright::board::Output;
@@ -15,6 +17,7 @@ use upright::protocol::frame::{self, Receiver};
 use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsOut};
 use upright_design::harness::{HarnessError, Pins, Target};
 
+use answer_limit::{AnswerLimit, LONGEST};
 use channels::{Channels, serial_lines};
 pub use error::EmulatorError;
 
@@ -34,7 +37,8 @@ pub enum PinLink {
 
 /// An image that runs in QEMU. Dropping it ends the emulator.
 pub struct Emulator {
-    process: Child,
+    process: Arc<Mutex<Child>>,
+    limit: AnswerLimit,
     channels: Channels,
     receiver: Receiver<MAX_PINS_OUT>,
     /// Bytes read from the serial line so far.
@@ -63,15 +67,23 @@ impl Emulator {
             PinLink::Files => return Err(EmulatorError::NeedsUnix),
             PinLink::Usart => serial_lines(command, image)?,
         };
-        Ok(Self { process, channels, receiver: Receiver::new(), received: 0, _directory: directory })
+        let process = Arc::new(Mutex::new(process));
+        let limit = AnswerLimit::of(&process, LONGEST);
+        Ok(Self { process, limit, channels, receiver: Receiver::new(), received: 0, _directory: directory })
     }
 
-    /// The error for an image that has ended, with what QEMU printed.
-    fn stopped(&mut self) -> HarnessError {
-        let _ = self.process.kill();
-        let status = self.process.wait().ok().and_then(|status| status.code()).unwrap_or(-1);
+    fn process(&self) -> MutexGuard<'_, Child> {
+        // The process is as it is, whatever panicked.
+        self.process.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The error for an image that has ended, or is ended because it does not answer, with what QEMU printed.
+    fn stopped(&self) -> HarnessError {
+        let mut process = self.process();
+        let _ = process.kill();
+        let status = process.wait().ok().and_then(|status| status.code()).unwrap_or(-1);
         let mut message = String::new();
-        if let Some(mut errors) = self.process.stderr.take() {
+        if let Some(mut errors) = process.stderr.take() {
             let _ = errors.read_to_string(&mut message);
         }
         let message = message.trim();
@@ -85,8 +97,9 @@ impl Emulator {
 impl Drop for Emulator {
     fn drop(&mut self) {
         // The image may wait inside the emulator, which then does not react to anything else.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+        let mut process = self.process();
+        let _ = process.kill();
+        let _ = process.wait();
     }
 }
 
@@ -94,6 +107,7 @@ impl Target for Emulator {
     fn tick(&mut self, pins: &Pins, serial: &mut Vec<u8>) -> Result<Output, HarnessError> {
         let (mut scratch, mut out) = ([0; MAX_PINS_IN], [0; MAX_PINS_IN]);
         let frame = frame::encode(pins, &mut scratch, &mut out)?;
+        self.limit.exchange();
         if self.channels.to_pins.write_all(frame).and_then(|()| self.channels.to_pins.flush()).is_err() {
             return Err(self.stopped());
         }
@@ -115,6 +129,7 @@ impl Target for Emulator {
         if self.channels.serial.read_exact(&mut serial[begin..]).is_err() {
             return Err(self.stopped());
         }
+        self.limit.exchange();
         Ok(output)
     }
 }

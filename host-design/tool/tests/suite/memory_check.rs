@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use upright::flash_image::REFERENCE_WORD;
+use upright::flash_image::REFERENCE;
 use upright::protocol::message::{Answer, Reply, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
@@ -134,8 +134,8 @@ fn code_that_is_damaged_before_power_comes_never_arms() {
         assert_eq!(found, (State::Fault, Some(Fault::Image), false), "{name} {flip:x?}");
     }
     // An image that the tool has not finished.
-    let reference = begin + 4 * REFERENCE_WORD as u32;
-    let bare = image.clone().with_bytes(reference, vec![0; 4]);
+    let reference = begin + 4 * REFERENCE.start as u32;
+    let bare = image.clone().with_bytes(reference, vec![0; 8]);
     assert_eq!(started(&bare), (State::Fault, Some(Fault::Image), false));
     // Negative controls: nothing is damaged, or only what is behind the image.
     assert_eq!(started(&image), (State::Disarmed, None, false));

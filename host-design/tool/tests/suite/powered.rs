@@ -1,6 +1,6 @@
 //! The flashed image on the virtual board, switched on and listened to.
 
-use upright::flash_image::{REFERENCE_WORD, checksum};
+use upright::flash_image::{REFERENCE, WordSums};
 use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Command, Message, Reply, Request, Telemetry};
@@ -21,8 +21,11 @@ pub(crate) fn image() -> Option<Image> {
 
 /// The image whose first `end` bytes are what was linked, with the checksum of what they are now.
 pub(crate) fn sealed(image: Image, end: usize) -> Image {
-    let word = checksum(&image.flash()[..end]);
-    image.with_bytes(0x0800_0000 + 4 * REFERENCE_WORD as u32, word.to_le_bytes().to_vec())
+    let flash = image.flash();
+    let words: Vec<u32> = flash[..end].as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    let WordSums { plain, weighted } = WordSums::of_image(&words);
+    let reference = [plain.to_le_bytes(), weighted.to_le_bytes()].concat();
+    image.with_bytes(0x0800_0000 + 4 * REFERENCE.start as u32, reference)
 }
 
 /// A board with all contacts closed and the motor's supply on.

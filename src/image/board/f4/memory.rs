@@ -1,6 +1,6 @@
 //! Memory that nobody writes, checked while the processor has nothing else to do.
 
-use upright::flash_image::WordSums;
+use upright::flash_image::{REFERENCE, WordSums};
 use upright::gains::{SENSORS, STATES};
 use upright::table::GainTable;
 
@@ -24,7 +24,7 @@ unsafe extern "C" {
 }
 
 /// The image in flash: from its start to the end of the initial values of variables, which come last.
-fn words() -> &'static [u32] {
+pub(super) fn words() -> &'static [u32] {
     const FLASH: usize = 0x0800_0000;
     // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
     unsafe {
@@ -34,10 +34,18 @@ fn words() -> &'static [u32] {
     }
 }
 
-/// The same as bytes.
-pub(super) fn image() -> &'static [u8] {
-    // SAFETY: any word is four bytes.
-    unsafe { words().align_to::<u8>().1 }
+/// The checksum of the image as it is now.
+pub(super) fn of_image() -> WordSums {
+    let mut sums = WordSums::default();
+    add(&mut sums, words().get(..REFERENCE.start).unwrap_or_default());
+    add(&mut sums, words().get(REFERENCE.end..).unwrap_or_default());
+    sums
+}
+
+// Once in the image.
+#[inline(never)]
+fn add(sums: &mut WordSums, words: &[u32]) {
+    sums.add(words);
 }
 
 /// Checks the gain table in RAM and the image in flash again and again.
@@ -56,7 +64,7 @@ impl MemoryCheck {
     /// The check of this table, and of the image as it is now.
     pub(super) fn new(table: &'static GainTable<STATES, SENSORS>) -> Self {
         let mut reference = WordSums::default();
-        reference.add(words());
+        add(&mut reference, words());
         Self { table, reference, wait: TICKS_PER_CHECK, read: 0, sums: WordSums::default() }
     }
 
@@ -83,7 +91,7 @@ impl MemoryCheck {
         }
         let rest = words().get(self.read..).unwrap_or_default();
         let part = rest.get(..words().len().div_ceil(CHECKS_PER_PASS)).unwrap_or(rest);
-        self.sums.add(part);
+        add(&mut self.sums, part);
         self.read += part.len();
         if part.len() < rest.len() {
             return None;

@@ -22,6 +22,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
 use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::{CounterWidth, is_at_end};
+use upright::flash_image::WordSums;
 use upright::gains::{SENSORS, STATES};
 use upright::protocol::message::Start;
 use upright::table::GainTable;
@@ -53,6 +54,7 @@ pub(crate) struct F4Board {
     watchdog: Watchdog,
     clock_fault: bool,
     wrong_chip: bool,
+    image_is_damaged: bool,
     overrun: bool,
     /// Whether the limit switches were open at the end of the previous tick.
     limits: [bool; 2],
@@ -87,6 +89,9 @@ pub(crate) fn set_up(
     angles.iter().for_each(Angles::set_up);
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
+    // In this order: what changes in between is found by the check.
+    let memory = MemoryCheck::new(table);
+    let image = memory::of_image();
     let hardware = F4Board {
         motor,
         steps: [const { Steps::new() }; GIVES_PULSES as usize],
@@ -98,14 +103,11 @@ pub(crate) fn set_up(
         watchdog: Watchdog::new(device.IWDG),
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
+        image_is_damaged: image != WordSums::carried_by(memory::words()),
         overrun: false,
         limits: [false; 2],
     };
-    // In this order: what changes in between is found by the check.
-    let memory = MemoryCheck::new(table);
-    let mut start = Start { reset, crash, ..Start::default() };
-    start.compare_image(memory::image());
-    (hardware, line, memory, start)
+    (hardware, line, memory, Start { reset, crash, image: image.weighted })
 }
 
 impl F4Board {
@@ -120,6 +122,10 @@ impl Board<SENSORS> for F4Board {
     const GIVES_PULSES: bool = GIVES_PULSES;
     /// See [`MemoryCheck`].
     const CHECKS_TABLES: bool = true;
+
+    fn image_is_damaged(&self) -> bool {
+        self.image_is_damaged
+    }
 
     fn inputs(&mut self) -> Inputs<SENSORS> {
         pins::show_tick(true);

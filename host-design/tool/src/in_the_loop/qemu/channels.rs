@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use super::EmulatorError;
 
-/// Longest wait for the image to connect to its pins.
-const START: Duration = Duration::from_secs(20);
+/// Longest wait for the image to connect to its pins, which takes a fraction of a second on an idle computer.
+const START: Duration = Duration::from_secs(120);
 /// The step that has failed if a channel cannot be opened.
 pub(super) const NO_CHANNEL: &str = "no channel to it";
 
