@@ -142,7 +142,7 @@ pub(crate) fn identified(rig: &Rig, text: &str, reading: &Reading) -> Result<Ide
     let table = RecordingTable::from_text(text, reading, links)
         .map_err(|source| IdentifyError::Table { file: file.clone(), source })?;
     let recordings = Recordings::Tables(vec![(file, table)], reading.clone());
-    identify_recordings(rig, &recordings, None, &Settings::default(), &|_| ())
+    identify_recordings(rig, None, &recordings, None, &Settings::default(), &|_| ())
 }
 
 /// Second over first moment of the first link of a single pendulum (m): 2/3 of its length.
