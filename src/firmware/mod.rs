@@ -152,8 +152,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         if !is_usable {
             supervisor.trip(at_start(Fault::Table));
         }
-        // The new firmware is not changed after this expression: that would make a copy, which needs a quarter of the
-        // board's stack.
+        // It is not changed after this expression: that would make a copy, which needs a quarter of the board's stack.
         Self {
             controller,
             supervisor,

@@ -1,9 +1,12 @@
 //! A trip that comes in the middle of any other function of the header is never lost.
 
+use std::process::Command;
+
 use super::avr::sent_by;
 use super::program::{Dialect, Program, is_there};
 use crate::published::rig_and_table;
 use upright_design::export::c_header;
+use upright_test_support::limits;
 
 const PROGRAM: &str = include_str!("interrupts.c");
 
@@ -32,7 +35,7 @@ fn on_the_host(header: &str) -> [u32; 3] {
     let program = Program::new(&with_hooks(header), PROGRAM);
     let output = program.compiled(Dialect { compiler: "gcc", flags: &["-std=c99", "-O1", "-w"] });
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let said = std::process::Command::new(program.path()).output().unwrap().stdout;
+    let said = limits::output(&mut Command::new(program.path())).stdout;
     let said = String::from_utf8_lossy(&said).into_owned();
     let numbers: Vec<u32> = said.split_whitespace().map(|word| word.parse().unwrap()).collect();
     let [moments, lost, calls, _] = numbers.try_into().unwrap();

@@ -3,9 +3,9 @@
 use super::SwingUpError;
 use super::check::check;
 use super::remedy::{Remedy, RigLimit};
-use super::robustness::{JUDGING_RUNS, RandomRuns, random_runs};
+use super::robustness::{RandomRuns, random_runs};
 use super::search::{SearchRanges, candidates};
-use super::setting::Setting;
+use super::setting::{JUDGING_RUNS, Setting};
 use crate::motion::Transition;
 use crate::parallel::{Progress, ProgressStep};
 use crate::rig::Rig;

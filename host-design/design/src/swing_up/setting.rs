@@ -9,12 +9,14 @@ use super::SwingUpError;
 use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
-use super::robustness::JUDGING_RUNS;
 use super::tracking::{Noise, PathFilter, stationary};
 use crate::motion::{Transition, rest};
 use crate::numerics::Matrix;
 use crate::rig::{Chain, KalmanNoise, Motor, Rig, Sensor, SwingUpRules};
 use crate::verify::{Disturbance, fewest_runs, wilson};
+
+/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
+pub(super) const JUDGING_RUNS: usize = 200;
 
 /// Process noise that the filter expects in motion, as multiples of the rig's: wrong masses disturb it more in motion
 /// than at rest.

@@ -41,9 +41,11 @@ macro_rules! dispatch {
 }
 
 /// Runs `action` for the smallest compiled size that has room for `states` and exactly so many `sensors`: NX may be
-/// larger than `states`. `None` if there is none. The sizes of chains, 2n + 2 states with n + 1 sensors, are all
-/// compiled; a `[model]`, of up to [`MAX_STATES`] states with up to [`MAX_MODEL_SENSORS`] sensors, is padded to the next
-/// size with states that stay 0. In a browser there are only the smaller sizes, so that a page is loaded sooner.
+/// larger than `states`. `None` if there is none.
+///
+/// The sizes of chains, 2n + 2 states with n + 1 sensors, are all compiled. A `[model]`, of up to [`MAX_STATES`] states
+/// with up to [`MAX_MODEL_SENSORS`] sensors, is padded to the next size with states that stay 0. In a browser there are
+/// only the smaller sizes, so that a page is loaded sooner.
 pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
     let is_model = sensors <= MAX_MODEL_SENSORS;
     let has_room = |states: usize, nx: usize| states == nx || (is_model && (1..nx).contains(&states));
@@ -58,8 +60,8 @@ pub fn with_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Optio
     }
 }
 
-/// As [`with_size`], but for exactly so many states, for the sizes with which the whole firmware runs on the host: chains
-/// of 1 to 6 links, and models of up to 6 states with one sensor. More sizes would only take longer to compile.
+/// As [`with_size`], but for exactly so many states, for the sizes with which the whole firmware runs on the host:
+/// chains of 1 to 6 links, and models of up to 6 states with one sensor. More sizes would only take longer to compile.
 pub fn with_firmware_size<A: WithSize>(states: usize, sensors: usize, action: A) -> Option<A::Output> {
     let is_exact = |states: usize, nx: usize| states == nx;
     dispatch! { is_exact(states, sensors), action,

@@ -233,30 +233,13 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
                 .to_owned(),
         );
     }
-    if !found.is_log {
-        notes.push(
-            "No recording shows a wrong time base: if its period is wrong by 1 %, moments and frictions are wrong by 1 to 2 %, and \
-             all else fits. Compare the times with a clock."
-                .to_owned(),
-        );
-    }
     if found.largest_angle_rad < LARGE_ENOUGH_RAD {
         notes.push(format!(
             "The links came only {:.0}° from hanging: shake more; the scale is twenty times better known at 60° than at 10°.",
             found.largest_angle_rad.to_degrees()
         ));
     }
-    match (found.other_delay(), found.estimate(ParameterKind::Delay)) {
-        (_, Some(estimate)) if found.late_ticks != 0 => notes.push(late_note(found, estimate)),
-        (Some(delay), Some(estimate)) => notes.push(format!(
-            "The force comes {:.2} ticks later than delay_ticks: set delay_ticks = {delay}; the new file has it.",
-            estimate.new
-        )),
-        (None, Some(estimate)) => {
-            notes.push(format!("delay_ticks stays: the force comes {:.2} ticks later than that.", estimate.new));
-        }
-        _ => (),
-    }
+    notes.extend(delay_note(found));
     notes.push(zeros_note(found));
     notes.push(format!(
         "A log four times as long halves the deviations, as far as the friction model allows; this log had {:.0} s.",
@@ -265,11 +248,25 @@ pub(super) fn notes(found: &Identification, settings: &Settings) -> Vec<String> 
     notes
 }
 
+/// How late the force is.
+fn delay_note(found: &Identification) -> Option<String> {
+    let estimate = found.estimate(ParameterKind::Delay)?;
+    Some(match found.other_delay() {
+        _ if found.late_ticks != 0 => late_note(found, estimate),
+        Some(delay) => format!(
+            "The force comes {:.2} ticks later than delay_ticks: set delay_ticks = {delay}; the new file has it.",
+            estimate.new
+        ),
+        None => format!("delay_ticks stays: the force comes {:.2} ticks later than that.", estimate.new),
+    })
+}
+
 /// What fewer or uneven rows cost.
 fn row_notes(found: &Identification) -> Vec<String> {
     let Some(rows) = &found.rows else { return Vec::new() };
     let mut notes = vec![
-        "No recording shows whether its times are right: with times twice as long, second moments are found four times as large."
+        "No recording shows whether its times are right: with times twice as long, second moments are found four times as large, \
+         and all else fits. Compare them with a clock."
             .to_owned(),
     ];
     if rows.costs() > DEAR {

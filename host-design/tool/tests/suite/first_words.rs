@@ -2,6 +2,8 @@
 
 use std::process::Command;
 
+use upright_test_support::limits::output;
+
 use crate::command::{path_of, status, stderr, stdout, upright};
 use crate::published::rig_path;
 
@@ -42,7 +44,7 @@ fn design_where_there_is_no_place_for_the_table_is_refused_before_the_work() {
     let design = |more: &[&str]| {
         let rig = path_of("single-quanser-ip02");
         let arguments = [&["design", &rig][..], more].concat();
-        Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).current_dir(&folder).output().unwrap()
+        output(Command::new(env!("CARGO_BIN_EXE_upright")).args(arguments).current_dir(&folder))
     };
     let refused = design(&[]);
     assert!(stderr(&refused).contains("--out FILE"), "{}", stderr(&refused));

@@ -259,7 +259,7 @@ fn too_few_runs_are_no_verdict_and_a_limit_that_is_not_there_has_no_share() {
 fn a_share_that_the_runs_cannot_show_ends_a_swing_up_before_it_begins() {
     let (_folder, path) = changed(SINGLE, &[("[swing_up]", "[swing_up]\nsuccess_percent = 99")]);
     let command = ["swing-up", path.to_str().unwrap(), "--no-write"];
-    let output = Command::new(env!("CARGO_BIN_EXE_upright")).args(command).output().unwrap();
+    let output = output(Command::new(env!("CARGO_BIN_EXE_upright")).args(command));
     assert_eq!(status(&output), 2, "{}", stderr(&output));
     for words in ["200 random runs", "at least 381 are needed", "at most 98.1"] {
         assert!(stderr(&output).contains(words), "{words}: {}", stderr(&output));
