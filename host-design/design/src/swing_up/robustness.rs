@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::closed_loop::{LOST_RAD, TrackingTrial, run};
+pub(super) use super::setting::JUDGING_RUNS;
 use super::setting::Setting;
 use crate::motion::{PlannedMotion, Transition};
 use crate::parallel;
@@ -46,9 +47,6 @@ impl MotionSpread {
 
 /// Ticks between two telemetry messages of a random run, once the hand has let go. It does so at the first message.
 pub(super) const TELEMETRY_TICKS: u16 = 20;
-
-/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
-pub(super) const JUDGING_RUNS: usize = 200;
 
 /// Outcome of random runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]

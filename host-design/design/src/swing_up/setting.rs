@@ -9,7 +9,6 @@ use super::SwingUpError;
 use super::dynamics::{Dynamics, dynamics};
 use super::hold::tick;
 use super::problem::Bounds;
-use super::robustness::JUDGING_RUNS;
 use super::tracking::{Noise, PathFilter, stationary};
 use crate::motion::{Transition, rest};
 use crate::numerics::Matrix;
@@ -28,6 +27,9 @@ const INPUT_WEIGHT_ON_STEPPER: f64 = 8.0;
 const LONG_ON_STEPPER: usize = 3;
 /// Time after which the filter at rest has settled (s).
 const SETTLE_S: f64 = 2.0;
+
+/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
+pub(super) const JUDGING_RUNS: usize = 200;
 
 /// Everything that searching and judging needs to know about a rig.
 pub(super) struct Setting<'a> {
