@@ -157,8 +157,8 @@ pub struct Imperfections {
     /// Those that are not simulated on this machine.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
-    /// All imperfections of the rig file's `[reality]` together, at rest and with a set-point that moves; none if it
-    /// has none.
+    /// All imperfections of the rig file's `[reality]` together, at rest and with a set-point that moves; none without
+    /// any.
     pub together: Option<SizeRuns>,
 }
 
