@@ -45,11 +45,11 @@ fn slow_uneven_rows_with_gaps_and_decimal_commas_are_identified() {
 
 #[test]
 fn rows_that_do_not_show_the_fastest_mode_are_refused_with_its_period() {
-    let text = table(&names(2), &Swing::of(2).rows(times(0.1, false)));
+    let text = table(&names(2), &Swing::of(2).rows(times(0.2, false)));
     let error = identified(&file(2), &text, &reading()).unwrap_err().to_string();
-    // Of two rods, by hand: the fastest clamped mode has a period of 0.36 s.
-    assert!(error.contains("a row every 100.0 ms") && error.contains("period is 3"), "{error}");
-    assert!(error.contains("record every 9"), "{error}");
+    // Of two rods that hang from a fixed point, by hand: 436 ms, and a quarter of it.
+    assert!(error.contains("a row every 200.0 ms") && error.contains("period is 436 ms"), "{error}");
+    assert!(error.contains("record every 109.0 ms"), "{error}");
 }
 
 /// Each of them takes a few seconds: run by `.ci/run`.

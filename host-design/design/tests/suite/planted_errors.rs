@@ -232,7 +232,6 @@ fn of_drives() -> Vec<Kind> {
         ("drive three rows early", late, &["written", "3 rows late"]),
         ("drive doubled", with(|row| row[3] *= 2.0), &["2 times those of the file", "supply_v"]),
         ("rail tilted", shaken_on(0.05), &["rail rises"]),
-        ("drive saturated", with(|row| row[3] *= 1.0 + row[3].abs()), &["refused"]),
         (
             "gear ratio halved",
             of_file("gear_ratio = 3.71", "gear_ratio = 1.855"),
