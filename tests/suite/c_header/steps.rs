@@ -273,7 +273,7 @@ fn stopped(name: &'static str, defect: Defect, action: u32) -> (FirmwareRun, Vec
     let (rig, table) = rig_and_table(name);
     let mut scenario = scenario(rig, Law::Lqr, 300);
     // The cart has to catch the link.
-    scenario.start[2] = 0.04;
+    scenario.start[2] = 0.4 * f64::from(table.limits.arm_angle_rad);
     let speed = |tick: &ControllerTick| f32::from_bits(tick.values[4]).abs();
     let healthy = recorded(rig, table, &scenario, None).wanted;
     let fastest = (3..100).max_by(|&a, &b| speed(&healthy[a]).total_cmp(&speed(&healthy[b]))).unwrap();

@@ -72,25 +72,28 @@ pub(super) fn enumeration() -> String {
     format!("{title}\ntypedef enum {{\n    UPRIGHT_NO_FAULT = 0,\n{lines}}} upright_fault;\n\n")
 }
 
-/// Functions in C of a fault: how often a light blinks for it, and with pulses whether they bring the cart to rest.
+/// Functions in C of a fault: how often a light blinks for it, and with pulses whether they bring the cart to rest. They
+/// are chains of conditions: of a switch, a compiler would make a table, which takes RAM on an AVR.
 pub(super) fn functions(has_steps: bool) -> String {
     let faults = header_faults();
-    let case = |fault: &HeaderFault, result: &dyn core::fmt::Display| {
-        format!("    case UPRIGHT_{}: return {result};\n", fault.name)
+    let is_one_of = |faults: &mut dyn Iterator<Item = &HeaderFault>| {
+        faults.map(|fault| format!("fault == UPRIGHT_{}", fault.name)).collect::<Vec<_>>().join("\n        || ")
     };
-    let blinks: String = faults.iter().map(|fault| case(fault, &fault.blinks)).collect();
+    let line = |blinks: u8| {
+        let faults = is_one_of(&mut faults.iter().filter(|fault| fault.blinks == blinks));
+        format!("    if ({faults}) {{\n        return {blinks};\n    }}\n")
+    };
+    let last = faults.last().map_or(0, |fault| fault.blinks);
+    let blinks: String = (1..=last).map(line).collect();
     let mut text = format!(
         "/* How often a light blinks for a fault, so that it can be counted; 0 without a fault. */\n\
-         UPRIGHT_CALL uint8_t upright_blinks(upright_fault fault)\n\
-         {{\n    switch (fault) {{\n{blinks}    default: return 0;\n    }}\n}}\n\n"
+         UPRIGHT_CALL uint8_t upright_blinks(upright_fault fault)\n{{\n{blinks}    return 0;\n}}\n\n"
     );
     if has_steps {
-        let brakes: String =
-            faults.iter().filter(|fault| fault.brakes).map(|fault| case(fault, &"true")).collect();
+        let brakes = is_one_of(&mut faults.iter().filter(|fault| fault.brakes));
         text += &format!(
             "/* Whether the drive may still bring the cart to rest after a fault. */\n\
-             static inline bool upright_brakes(upright_fault fault)\n\
-             {{\n    switch (fault) {{\n{brakes}    default: return false;\n    }}\n}}\n\n"
+             static inline bool upright_brakes(upright_fault fault)\n{{\n    return {brakes};\n}}\n\n"
         );
     }
     text
