@@ -162,8 +162,8 @@ pub trait Board<const NY: usize> {
     /// the motor stays off.
     fn tick_s(&self) -> f32;
 
-    /// Whether the image in flash has another [checksum](crate::flash_image) than the one that it carries. Then the motor
-    /// stays off. A board that does not look says no.
+    /// Whether the image in flash has another [checksum](crate::flash_image) than the one that it carries. Then the
+    /// motor stays off. A board that does not look says no.
     fn image_is_damaged(&self) -> bool {
         false
     }

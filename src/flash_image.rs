@@ -3,12 +3,12 @@
 
 use core::ops::Range;
 
-/// Numbers of the words of the vector table that hold the checksum: ARM reserves them on every Cortex-M, and no processor
-/// reads them (Armv7-M Architecture Reference Manual, B1.5.3).
+/// Numbers of the words of the vector table that hold the checksum: ARM reserves them on every Cortex-M, and no
+/// processor reads them (Armv7-M Architecture Reference Manual, B1.5.3).
 pub const REFERENCE: Range<usize> = 8..10;
 
-/// Sum, and sum of the sums, of words, modulo 2³² (Fletcher's checksum): a bit that changes changes both. A word takes a
-/// few cycles, and its CRC-32 would take a hundred.
+/// Sum, and sum of the sums, of words, modulo 2³² (Fletcher's checksum): a bit that changes changes both. A word takes
+/// a few cycles, and its CRC-32 would take a hundred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WordSums {
     /// Sum of the words.
