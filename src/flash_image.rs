@@ -7,8 +7,8 @@ use core::ops::Range;
 /// processor reads them (Armv7-M Architecture Reference Manual, B1.5.3).
 pub const REFERENCE: Range<usize> = 8..10;
 
-/// Sum, and sum of the sums, of words, modulo 2³² (Fletcher's checksum): a bit that changes changes both. A word takes
-/// a few cycles, and its CRC-32 would take a hundred.
+/// Sum, and sum of the sums, of words, modulo 2³² (Fletcher's checksum): a bit that changes changes the first, words
+/// that are swapped the second. A word takes a few cycles, and its CRC-32 would take a hundred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WordSums {
     /// Sum of the words.
@@ -59,7 +59,6 @@ mod tests {
                 image[at] ^= 1 << bit;
                 let found = WordSums::of_image(&image);
                 assert_eq!(found == whole, REFERENCE.contains(&at), "word {at}, bit {bit}");
-                assert_eq!(found.weighted == whole.weighted, REFERENCE.contains(&at), "word {at}, bit {bit}");
                 image[at] ^= 1 << bit;
             }
         }

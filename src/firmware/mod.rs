@@ -208,8 +208,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
     }
 
-    /// Takes whether the board checks the tables, and whether it has found its image damaged: then [`Fault::Image`] is
-    /// latched, and cannot be cleared.
+    /// Takes whether the board checks the tables, and whether its image is damaged: [`Fault::Image`], never cleared.
     #[inline]
     pub(crate) fn compare_memory(&mut self, checks_tables: bool, image_is_damaged: bool) {
         self.board_checks_tables = checks_tables;

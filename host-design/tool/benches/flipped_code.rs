@@ -27,8 +27,8 @@ const OF_THE_TICK: [&str; 3] = ["hot_path3act", "hot_path7predict", "SysTick"];
 /// A tick: the force of the power stage (N), and the largest angle of a link (rad).
 type Tick = (f32, f64);
 
-/// The ticks of balancing until the motor is off, or until `LONGEST` and some more after the last possible flip. The
-/// bit flips in tick `at`.
+/// The ticks of balancing until the motor is off, or until more than `LONGEST` after the last possible flip. The bit
+/// flips in tick `at`.
 fn balanced(rig: &Rig, table: &TableValues, image: &Image, flip: Option<(usize, u32, u8)>) -> Vec<Tick> {
     let scenario =
         Scenario { sensing: Sensing::Encoders, force_noise_n: 0.1, ..Scenario::at_rest(rig, Law::Lqr) };

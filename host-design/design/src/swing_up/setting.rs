@@ -31,9 +31,6 @@ const LONG_ON_STEPPER: usize = 3;
 /// Time after which the filter at rest has settled (s).
 const SETTLE_S: f64 = 2.0;
 
-/// Number of random runs that judge a motion, with the seeds from 1 on. The rounds use the seeds after them.
-pub(super) const JUDGING_RUNS: usize = 200;
-
 /// Everything that searching and judging needs to know about a rig.
 pub(super) struct Setting<'a> {
     pub(super) rig: &'a Rig,
