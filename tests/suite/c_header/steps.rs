@@ -1,10 +1,9 @@
 //! The header for a drive with pulses: against the firmware's controller and its supervision, in closed loop.
 
 use super::program::is_there;
-use super::recorded::{BALANCING, ControllerTick, Defect, FAULT, FirmwareRun, command, recorded, scenario};
+use super::recorded::{BALANCING, ControllerTick, FAULT, FirmwareRun, scenario};
 use super::{STRICT, differing, first_difference, replayed};
 use crate::published::{rig_and_table, table};
-use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::control::controller::Controller;
 use upright::supervision::debounce::Debounce;
@@ -259,58 +258,6 @@ fn faults_of_a_stepper_end_the_law_in_the_tick_of_the_firmware() {
         if expected == [Fault::Motor] {
             let at_cart = header.replace("UPRIGHT_MOTOR_SENSOR 1", "UPRIGHT_MOTOR_SENSOR 0");
             assert!(differing(&run, &replayed(&at_cart, STRICT, &run.input)) > 0);
-        }
-    }
-}
-
-/// What the controller in C is told of a defect, in every tick from then on: see `replay.c`.
-const TRIP: u32 = 64;
-const TRIP_AT_SWITCH: u32 = 128;
-
-/// A run of the whole firmware, with a defect that the controller in C hears of by `action`, and its answers. It comes
-/// when the cart is fastest.
-fn stopped(name: &'static str, defect: Defect, action: u32) -> (FirmwareRun, Vec<ControllerTick>) {
-    let (rig, table) = rig_and_table(name);
-    let mut scenario = scenario(rig, Law::Lqr, 300);
-    // The cart has to catch the link.
-    scenario.start[2] = 0.4 * f64::from(table.limits.arm_angle_rad);
-    let speed = |tick: &ControllerTick| f32::from_bits(tick.values[4]).abs();
-    let healthy = recorded(rig, table, &scenario, None).wanted;
-    let fastest = (3..100).max_by(|&a, &b| speed(&healthy[a]).total_cmp(&speed(&healthy[b]))).unwrap();
-    let mut run = recorded(rig, table, &scenario, Some((fastest, defect)));
-    for row in &mut run.input[run.first + fastest..] {
-        row[0] |= action;
-    }
-    let answers = replayed(&c_header(rig, table).unwrap(), STRICT, &run.input);
-    (run, answers)
-}
-
-#[test]
-fn after_a_fault_a_steppers_cart_is_braked_with_the_pulses_of_the_whole_firmware() {
-    if !is_there("gcc") {
-        return;
-    }
-    let defects: [(Defect, u32, Fault, bool); 4] = [
-        (|pins, _| pins.raw_counts[1] = pins.raw_counts[1].wrapping_add(700), 0, Fault::Encoder, true),
-        (|pins, _| pins.contacts.limit_high = true, TRIP_AT_SWITCH, Fault::LimitSwitch, true),
-        (|pins, _| pins.contacts.emergency_stop = true, TRIP, Fault::EmergencyStop, false),
-        (|_, output| *output = Output::OFF, 0, Fault::Motor, false),
-    ];
-    for (defect, action, fault, brakes) in defects {
-        for name in ["single-stepper", "quadruple-stepper"] {
-            let (run, answers) = stopped(name, defect, action);
-            assert_eq!(run.fault, Some(fault), "{name}");
-            let from = run.first + run.wanted.len() - 1;
-            let wanted = [run.wanted.last().unwrap().duty].into_iter().chain(run.after.iter().map(command));
-            let wanted: Vec<i32> = wanted.map(|pulses| pulses as i32).collect();
-            let found: Vec<i32> = answers[from..].iter().map(|tick| tick.duty as i32).collect();
-            assert_eq!(found, wanted, "{name} {fault}");
-            let on = run.after.iter().map(|output| output.enable);
-            assert!(on.eq(answers[from + 1..].iter().map(|tick| tick.is_on)), "{name} {fault}");
-            let braking = wanted.iter().filter(|pulses| **pulses != 0).count();
-            println!("{name} {fault}: {:?}", &wanted[..braking]);
-            assert_eq!(braking > 0, brakes, "{name} {fault}: {wanted:?}");
-            assert!(answers[from..].iter().all(|tick| tick.state == FAULT), "{name} {fault}");
         }
     }
 }

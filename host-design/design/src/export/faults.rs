@@ -77,7 +77,10 @@ pub(super) fn enumeration() -> String {
 pub(super) fn functions(has_steps: bool) -> String {
     let faults = header_faults();
     let is_one_of = |faults: &mut dyn Iterator<Item = &HeaderFault>| {
-        faults.map(|fault| format!("fault == UPRIGHT_{}", fault.name)).collect::<Vec<_>>().join("\n        || ")
+        faults
+            .map(|fault| format!("fault == UPRIGHT_{}", fault.name))
+            .collect::<Vec<_>>()
+            .join("\n        || ")
     };
     let line = |blinks: u8| {
         let faults = is_one_of(&mut faults.iter().filter(|fault| fault.blinks == blinks));
