@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::SwingUpError;
 use super::closed_loop::{LOST_RAD, TrackingTrial, run};
-pub(super) use super::setting::JUDGING_RUNS;
 use super::setting::Setting;
 use crate::motion::{PlannedMotion, Transition};
 use crate::parallel;
