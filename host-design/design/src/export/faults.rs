@@ -72,8 +72,8 @@ pub(super) fn enumeration() -> String {
     format!("{title}\ntypedef enum {{\n    UPRIGHT_NO_FAULT = 0,\n{lines}}} upright_fault;\n\n")
 }
 
-/// Functions in C of a fault: how often a light blinks for it, and with pulses whether they bring the cart to rest. They
-/// are chains of conditions: of a switch, a compiler would make a table, which takes RAM on an AVR.
+/// Functions in C of a fault: how often a light blinks for it, and with pulses whether they bring the cart to rest.
+/// They are chains of conditions: of a switch, a compiler would make a table, which takes RAM on an AVR.
 pub(super) fn functions(has_steps: bool) -> String {
     let faults = header_faults();
     let is_one_of = |faults: &mut dyn Iterator<Item = &HeaderFault>| {
