@@ -142,13 +142,8 @@ impl Supervisor {
         let unknown = Inhibits::NOT_HOMED.when(!self.positions_known);
         unknown.union(match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
-            State::Jogging
-            | State::Armed
-            | State::Raising
-            | State::Balancing
-            | State::Holding
-            | State::Lowering => Inhibits::RUNNING,
-            State::Identifying => Inhibits::RUNNING,
+            State::Jogging | State::Identifying | State::Armed | State::Raising => Inhibits::RUNNING,
+            State::Balancing | State::Holding | State::Lowering => Inhibits::RUNNING,
             State::Fault => Inhibits::FAULT,
         })
     }

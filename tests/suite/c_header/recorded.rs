@@ -50,8 +50,8 @@ pub(crate) struct FirmwareRun {
     pub(crate) input: Vec<Vec<u32>>,
     /// What it has to answer from the first tick of balancing on, up to the tick of a fault.
     pub(crate) wanted: Vec<ControllerTick>,
-    /// The firmware's outputs after that.
-    pub(crate) after: Vec<Output>,
+    /// The firmware's output in every tick.
+    pub(crate) outputs: Vec<Output>,
     /// The first tick of balancing.
     pub(crate) first: usize,
     pub(crate) fault: Option<Fault>,
@@ -144,8 +144,7 @@ pub(crate) fn recorded(
         }
         [action, setpoint.to_bits()].into_iter().chain(counters.iter().copied()).collect()
     });
-    let after = outputs[first + wanted.len()..].to_vec();
-    FirmwareRun { input: input.collect(), wanted, after, first, fault: recording.fault }
+    FirmwareRun { input: input.collect(), wanted, outputs, first, fault: recording.fault }
 }
 
 /// The command of an output: bits of the duty, or pulses.

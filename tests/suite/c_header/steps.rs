@@ -1,7 +1,7 @@
 //! The header for a drive with pulses: against the firmware's controller and its supervision, in closed loop.
 
-use super::program::is_there;
-use super::recorded::{BALANCING, ControllerTick, FAULT, FirmwareRun, scenario};
+use super::program::{Program, is_there};
+use super::recorded::{BALANCING, ControllerTick, Defect, FAULT, FirmwareRun, command, recorded, scenario};
 use super::{STRICT, differing, first_difference, replayed};
 use crate::published::{rig_and_table, table};
 use upright::control::actuator::Drive;
@@ -91,7 +91,7 @@ impl WithSize for StepRun<'_> {
             }
             bench.tick(Drive::Steps(pulses));
         }
-        FirmwareRun { input, wanted, after: Vec::new(), first, fault: balanced.fault }
+        FirmwareRun { input, wanted, outputs: Vec::new(), first, fault: balanced.fault }
     }
 }
 
@@ -258,6 +258,73 @@ fn faults_of_a_stepper_end_the_law_in_the_tick_of_the_firmware() {
         if expected == [Fault::Motor] {
             let at_cart = header.replace("UPRIGHT_MOTOR_SENSOR 1", "UPRIGHT_MOTOR_SENSOR 0");
             assert!(differing(&run, &replayed(&at_cart, STRICT, &run.input)) > 0);
+        }
+    }
+}
+
+/// What the controller in C is told of a defect, in every tick from then on: see `replay.c`.
+const TRIP: u32 = 64;
+const TRIP_AT_SWITCH: u32 = 128;
+
+/// A run of the whole firmware, with a defect that the controller in C hears of by `action`, and its answers. It comes
+/// when the cart is fastest.
+fn stopped(name: &'static str, defect: Defect, action: u32) -> (FirmwareRun, Vec<ControllerTick>) {
+    let (rig, table) = rig_and_table(name);
+    let mut scenario = scenario(rig, Law::Lqr, 300);
+    // The cart has to catch the link.
+    scenario.start[2] = 0.4 * f64::from(table.limits.arm_angle_rad);
+    let speed = |tick: &ControllerTick| f32::from_bits(tick.values[4]).abs();
+    let healthy = recorded(rig, table, &scenario, None).wanted;
+    let fastest = (3..100).max_by(|&a, &b| speed(&healthy[a]).total_cmp(&speed(&healthy[b]))).unwrap();
+    let mut run = recorded(rig, table, &scenario, Some((fastest, defect)));
+    for row in &mut run.input[run.first + fastest..] {
+        row[0] |= action;
+    }
+    let program = Program::that_replays(&c_header(rig, table).unwrap(), STRICT);
+    // The hand lets go, and the record begins, when telemetry says so: some ticks after the law has begun.
+    let begun = |early: usize| {
+        let mut run = run.clone();
+        let armed = run.input.iter().position(|row| row[0] & 4 != 0).unwrap();
+        run.input[armed][0] &= !4;
+        run.input[armed - early..armed].iter_mut().for_each(|row| row[0] |= 8);
+        run.input[armed - early][0] |= 4;
+        run.first -= early;
+        let answers = program.replayed(&run.input);
+        (run, answers)
+    };
+    let law = |(run, answers): &(FirmwareRun, Vec<ControllerTick>)| {
+        let ticks = run.first..run.first + fastest;
+        ticks.into_iter().all(|tick| answers[tick].duty == command(&run.outputs[tick]))
+    };
+    (0..4).map(begun).find(law).unwrap_or_else(|| panic!("{name}: the law has other pulses"))
+}
+
+#[test]
+fn after_a_fault_a_steppers_cart_is_braked_with_the_pulses_of_the_whole_firmware() {
+    if !is_there("gcc") {
+        return;
+    }
+    let defects: [(Defect, u32, Fault, bool); 3] = [
+        (|pins, _| pins.raw_counts[1] = pins.raw_counts[1].wrapping_add(700), 0, Fault::Encoder, true),
+        (|pins, _| pins.contacts.limit_high = true, TRIP_AT_SWITCH, Fault::LimitSwitch, true),
+        (|pins, _| pins.contacts.emergency_stop = true, TRIP, Fault::EmergencyStop, false),
+    ];
+    for (defect, action, fault, brakes) in defects {
+        for name in ["single-stepper", "quadruple-stepper"] {
+            let (run, answers) = stopped(name, defect, action);
+            assert_eq!(run.fault, Some(fault), "{name}");
+            let wanted: Vec<i32> = run.outputs.iter().map(|output| command(output) as i32).collect();
+            let found: Vec<i32> = answers.iter().map(|tick| tick.duty as i32).collect();
+            let balances = run.first;
+            assert_eq!(found[balances..], wanted[balances..], "{name} {fault}");
+            let on = run.outputs.iter().zip(&answers).skip(balances);
+            assert!(on.clone().all(|(output, tick)| output.enable == tick.is_on), "{name} {fault}");
+            let from = answers.iter().position(|tick| tick.state == FAULT).unwrap();
+            let wanted = &wanted[from..];
+            let braking = wanted.iter().filter(|pulses| **pulses != 0).count();
+            println!("{name} {fault}: {:?}", &wanted[..braking]);
+            assert_eq!(braking > 0, brakes, "{name} {fault}: {wanted:?}");
+            assert!(answers[from..].iter().all(|tick| tick.state == FAULT), "{name} {fault}");
         }
     }
 }

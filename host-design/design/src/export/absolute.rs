@@ -7,11 +7,11 @@ use crate::rig::{LinkEncoder, Rig, Sensor};
 
 /// How the sensors of a rig read, if one of them is absolute.
 pub(super) struct Readings {
-    sensors: Vec<SensorRange>,
+    sensors: Vec<SensorReading>,
 }
 
 /// How a sensor reads.
-struct SensorRange {
+struct SensorReading {
     /// Counts until its reading wraps, less 1.
     range: u32,
     /// Bits of a reading that are finer than those used.
@@ -50,7 +50,7 @@ impl Readings {
     /// The members of the table, if a sensor is absolute.
     pub(super) fn initialise(&self, out: &mut Initializer) {
         if self.are_absolute() {
-            let of = |value: fn(&SensorRange) -> u32| self.sensors.iter().map(value).collect::<Vec<_>>();
+            let of = |value: fn(&SensorReading) -> u32| self.sensors.iter().map(value).collect::<Vec<_>>();
             out.indices("range", &of(|reading| reading.range));
             out.indices("unused_bits", &of(|reading| reading.unused_bits));
             out.pairs("readings", self.sensors.iter().map(|reading| reading.readings));
@@ -59,9 +59,9 @@ impl Readings {
 }
 
 /// How this sensor reads; the file gives it so many bits.
-fn reading(sensor: &Sensor, bits: u32) -> SensorRange {
+fn reading(sensor: &Sensor, bits: u32) -> SensorReading {
     let Some(range) = sensor.absolute else {
-        return SensorRange { range: u32::MAX, unused_bits: 0, readings: [0, u32::MAX], what: None };
+        return SensorReading { range: u32::MAX, unused_bits: 0, readings: [0, u32::MAX], what: None };
     };
     let top = (1 << range.bits) - 1;
     if range.has_dead_band() {
@@ -71,9 +71,9 @@ fn reading(sensor: &Sensor, bits: u32) -> SensorRange {
             "the potentiometer's reading of {bits} bits, 0 to {}, which does not wrap",
             (1u32 << bits) - 1
         );
-        return SensorRange { range: u32::MAX, unused_bits: bits - range.bits, readings, what: Some(what) };
+        return SensorReading { range: u32::MAX, unused_bits: bits - range.bits, readings, what: Some(what) };
     }
     let what =
         format!("the sensor's reading of {bits} bits, 0 to {}; it may wrap anywhere", (1u32 << bits) - 1);
-    SensorRange { range: top, unused_bits: bits - range.bits, readings: [0, u32::MAX], what: Some(what) }
+    SensorReading { range: top, unused_bits: bits - range.bits, readings: [0, u32::MAX], what: Some(what) }
 }

@@ -1,11 +1,12 @@
 //! From where a program may call the functions of the header: one table for its first comment and for the guide.
 
 /// Functions, and from where they may be called.
-pub const CALLING: [(&[&str], &str); 3] = [
+pub const CALLING: [(&[&str], &str); 4] = [
     (
         &["upright_trip", "upright_trip_at_switch"],
         "anywhere: they may interrupt every function, and each other",
     ),
+    (&["upright_table_is_intact", "upright_arithmetic_is_exact"], "anywhere: they change nothing"),
     (&["upright_init"], "the start, before anything that calls another one"),
     (
         &[
