@@ -52,28 +52,14 @@ impl<const NY: usize> Encoders<NY> {
         self.measure(raw, &SVector::<f32, NY>::zeros());
     }
 
-    /// How far these readings are from the last ones that were taken (counts).
-    pub fn moved(&self, raw: &[u32; NY]) -> [i32; NY] {
-        let mut moved = [0; NY];
-        for ((counter, moved), &raw) in moved.iter_mut().enumerate().zip(raw) {
-            *moved = self.moved_of(counter, raw);
-        }
-        moved
-    }
-
-    #[inline(always)]
-    fn moved_of(&self, counter: usize, raw: u32) -> i32 {
-        let moved = raw.wrapping_sub(self.last[counter]) as i32;
-        // The inner cast keeps the low 16 bits: the signed distance modulo the counter's range.
-        if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved }
-    }
-
     /// Takes new counter readings and returns the positions, like [`positions`](Self::positions).
     #[inline(always)]
     pub(crate) fn measure<T: Scalar>(&mut self, raw: &[u32; NY], step: &SVector<T, NY>) -> SVector<T, NY> {
         let mut y = *step;
         for (counter, &raw) in raw.iter().enumerate() {
-            let moved = self.moved_of(counter, raw);
+            let moved = raw.wrapping_sub(self.last[counter]) as i32;
+            // The inner cast keeps the low 16 bits: the signed distance modulo the counter's range.
+            let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
             self.last[counter] = raw;
             self.position[counter] = self.position[counter].wrapping_add(moved);
             y[counter] *= T::from_counts(self.position[counter]);

@@ -37,26 +37,38 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         lost.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor }))
     }
 
-    /// The first sensor whose counter has moved further in this tick than its cart or joint can; none while positions
-    /// are not known. Such a tick's readings are not taken.
-    pub(super) fn jumped(&self) -> Option<u8> {
-        let observer = self.table.observer.as_ref().filter(|_| self.supervisor.uses_positions())?;
-        let moved = self.controller.encoders().moved(&self.raw_counts);
-        jumped(&moved, &observer.step.data.0[0], &self.table.limits, self.table.tick_s)
+    /// The first sensor whose counter has moved further in this tick than its cart or joint can, from the counts
+    /// `before`; none while positions are not known. The readings of such a tick are taken back.
+    #[inline(always)]
+    pub(super) fn jumped(&mut self, before: &[i32; NY]) -> Option<u8> {
+        let jumped = jumped(before, self.controller.encoders().counts(), &self.jumps.furthest_counts)?;
+        self.supervisor.uses_positions().then(|| {
+            self.take_back(before);
+            jumped
+        })
+    }
+
+    /// Takes the readings of this tick back: the counts are those `before`, and so are the readings that go with them.
+    #[cold]
+    #[inline(never)]
+    fn take_back(&mut self, before: &[i32; NY]) {
+        let mut readings = self.raw_counts;
+        for (sensor, (reading, &count)) in readings.iter_mut().zip(before).enumerate() {
+            *reading = self.controller.encoders().reading_at(sensor, count).unwrap_or(*reading);
+        }
+        self.controller.encoders_mut().home(&readings, before);
     }
 
     /// Counts a jump, after which the rig has to be slow anew before the motor comes on. The third in a row is a fault;
     /// behind another fault, positions are lost all the same.
-    pub(super) fn judge_jump(&mut self, jumped: Option<u8>) {
-        let Some(sensor) = jumped else {
-            self.jumps = 0;
-            return;
-        };
-        self.jumps = self.jumps.saturating_add(1);
+    #[cold]
+    #[inline(never)]
+    pub(super) fn reject_jump(&mut self, sensor: u8) {
+        self.jumps.in_a_row = self.jumps.in_a_row.saturating_add(1);
         self.detection.count_rejected();
         let counts = *self.controller.encoders().counts();
         self.calibration.restart_slow(&counts);
-        if self.jumps < IN_A_ROW {
+        if self.jumps.in_a_row < IN_A_ROW {
             return;
         }
         if self.supervisor.state() == State::Fault {

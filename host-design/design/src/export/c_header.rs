@@ -159,12 +159,10 @@ fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readin
     out.counts("slow_counts", &table.limits.slow_counts[..sensors]);
     out.counts("rest_counts", &table.limits.rest_counts[..sensors]);
     out.counts("turn_counts", &table.limits.turn_counts[..sensors]);
-    let steps = observer.step.data.0[0][..sensors].iter().enumerate();
-    let furthest = |(sensor, &step): (usize, &f32)| {
-        // Saturates: nothing is too far.
-        furthest_counts(&table.limits, sensor, step, table.tick_s) as i32
-    };
-    out.counts("furthest_counts", &steps.map(furthest).collect::<Vec<_>>());
+    let furthest = furthest_counts(&table.limits, &observer.step.data.0[0], table.tick_s);
+    // At most what C compares with: nothing is too far.
+    let furthest = furthest.map(|counts| i32::try_from(counts).unwrap_or(i32::MAX));
+    out.counts("furthest_counts", &furthest[..sensors]);
     readings.initialise(&mut out);
     out.sealed()
 }
