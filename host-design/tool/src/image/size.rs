@@ -7,9 +7,10 @@ use upright_board::{Lines, LinesError};
 use super::elf::{ImageChip, Item, LinkedImage, LinkedSection};
 
 /// Limit of an image's code (bytes): its flash without constants, among them the motions, and without the gain table.
-pub const CODE_LIMIT: u32 = 48 * 1024;
-/// The same for a Pico, whose code holds a USB device and arithmetic with f32.
-pub const PICO_CODE_LIMIT: u32 = 73 * 1024;
+/// An eighth of the flash of the smallest of these boards (STM32F446): the rest is for motions.
+pub const CODE_LIMIT: u32 = 64 * 1024;
+/// The same for a Pico, whose code holds a USB device and arithmetic with f32: a sixteenth of its flash.
+pub const PICO_CODE_LIMIT: u32 = 128 * 1024;
 /// Limit of its static RAM (bytes): its variables, not counting the stack and the gain table.
 pub const RAM_LIMIT: u32 = 8 * 1024;
 

@@ -17,8 +17,8 @@ use crate::output::print;
 use crate::variation::Wanted;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
-/// panic; exit status 1 if, without its tables, it takes more than 48 KiB of code or 8 KiB of static RAM, if it takes
-/// more than 5 KiB of stack, or if it can panic or allocate. The image of a Pico or Pico 2 may take 73 KiB of code and
+/// panic; exit status 1 if, without its tables, it takes more than 64 KiB of code or 8 KiB of static RAM, if it takes
+/// more than 5 KiB of stack, or if it can panic or allocate. The image of a Pico or Pico 2 may take 128 KiB of code and
 /// 8 KiB of stack; its crates for USB can panic, and its exit status is 1 if an interrupt can, such as the tick.
 #[derive(Args)]
 #[command(before_help = "\
