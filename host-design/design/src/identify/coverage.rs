@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::channel::chain_of;
+use super::doubt::Doubt;
 use super::error::IdentifyError;
 use super::estimate::{Settings, identify};
 use super::estimated::Identification;
@@ -130,7 +131,7 @@ pub struct Identified {
     pub number: u64,
     /// Why no rig file would be written; none if one would be.
     pub refused: Option<String>,
-    /// Why one would be written only on trust.
+    /// Why one would be written only on trust; a file whose travel per count is off is rightly doubted.
     pub doubted: Option<String>,
     /// Error of each number, even if no rig file would be written.
     pub missed: Vec<Missed>,
@@ -257,13 +258,25 @@ pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, 
         Ok(found) => Identified {
             number,
             refused: found.refusal.as_ref().map(ToString::to_string),
-            doubted: found.doubted().map(ToString::to_string),
+            doubted: wrongly_doubted(&machine, &found),
             missed: missed(&machine, &found),
         },
         Err(error) => {
             Identified { number, refused: Some(error.to_string()), doubted: None, missed: Vec::new() }
         }
     })
+}
+
+/// Every reason to trust no numbers but that the travel per count is not that of the file, if so it is.
+fn wrongly_doubted(machine: &DrawnMachine, found: &Identification) -> Option<String> {
+    let travel = machine.truth(ParameterKind::Travel).unwrap_or(1.0);
+    let is_right = |doubt: &Doubt| match doubt {
+        Doubt::Travel { share, .. } => (share - travel).abs() < (travel - 1.0).abs(),
+        _ => false,
+    };
+    let doubts = found.doubts.iter().filter(|doubt| doubt.needs_trust() && !is_right(doubt));
+    let all: Vec<String> = doubts.map(ToString::to_string).collect();
+    (!all.is_empty()).then(|| all.join(" "))
 }
 
 fn missed(machine: &DrawnMachine, found: &Identification) -> Vec<Missed> {
