@@ -93,12 +93,12 @@ fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, Strin
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use upright_design::identify::RealisedCart;
 
     /// An identification that found nothing new.
-    const NOTHING: Identification = Identification {
+    pub(in crate::identified) const NOTHING: Identification = Identification {
         seconds: 60.0,
         lost_ticks: 0,
         rows: None,
