@@ -231,7 +231,7 @@ fn of_drives() -> Vec<Kind> {
         ("joint in degrees", with(|row| row[2] = row[2].to_degrees()), &["refused", "in degrees"]),
         ("drive three rows early", late, &["written", "3 rows late"]),
         ("drive doubled", with(|row| row[3] *= 2.0), &["2 times those of the file", "supply_v"]),
-        ("rail tilted", shaken_on(0.05), &["rail rises"]),
+        ("rail tilted", shaken_on(0.02), &["rail rises"]),
         (
             "gear ratio halved",
             of_file("gear_ratio = 3.71", "gear_ratio = 1.855"),
