@@ -72,8 +72,8 @@ fn a_smaller_weight_of_the_set_point_overshoots_less_and_arrives_all_the_same() 
             let integral = Some(Integral { position_weight: weight, setpoint_weight });
             overshoot(&Rig { integral, ..rig(name) }, step_m)
         });
-        // Negative control: the whole precompensation N.
-        assert!(overshoots[0] > 0.25, "{name}: {overshoots:?}");
+        // Negative control: the whole precompensation N. The governor slows the set-point of a loop that overshoots.
+        assert!(overshoots[0] > 0.1, "{name}: {overshoots:?}");
         assert!(overshoots[2] < 0.05, "{name}: {overshoots:?}");
         assert!(overshoots[4] < 0.01, "{name}: {overshoots:?}");
     }

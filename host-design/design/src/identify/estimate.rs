@@ -125,7 +125,7 @@ pub fn identify_recordings(
         let wiring = in_tables.unwrap_or_else(|| wiring_search::find(&model, &record, &loose, progress));
         found.wiring = Some(wiring.clone());
         if !wiring.is_as_in_file() {
-            found.refusal = Some(Refusal::Wiring(wiring));
+            found.refusal = Some(Refusal::Wiring(Box::new(wiring)));
             return Ok(found);
         }
     }

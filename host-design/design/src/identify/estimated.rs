@@ -50,7 +50,7 @@ impl Estimate {
 }
 
 /// Result of an identification.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Identification {
     /// Duration of the logs without their gaps (s).
     pub seconds: f64,

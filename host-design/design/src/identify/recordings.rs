@@ -99,18 +99,18 @@ impl Recordings {
                 let record = Record::of(rig, &logs, stride);
                 Ok(Recorded { record, finer, lost_ticks, is_driven: true, rows: None })
             }
-            Recordings::Tables(tables, reading) => of_tables(rig, tables, reading, &[]),
+            Recordings::Tables(tables, reading) => of_tables(rig, tables, reading, None),
         }
     }
 
-    /// The samples of tables that were described wrongly.
+    /// The samples of tables that were described wrongly, whatever their values say against it.
     ///
     /// # Errors
     /// [`IdentifyError`] if they cannot be of this rig.
     pub(super) fn reread(&self, rig: &Rig, misread: &[Misreading]) -> Result<Recorded, IdentifyError> {
         match self {
             Recordings::Logs(_) => self.recorded(rig),
-            Recordings::Tables(tables, reading) => of_tables(rig, tables, reading, misread),
+            Recordings::Tables(tables, reading) => of_tables(rig, tables, reading, Some(misread)),
         }
     }
 
@@ -137,7 +137,7 @@ impl Recordings {
         let (mut begun, mut left) = (Vec::new(), seconds);
         for (file, table) in tables {
             let one = [(file.clone(), table.clone())];
-            let period_s = of_tables(rig, &one, reading, &[])?.record.period_s();
+            let period_s = of_tables(rig, &one, reading, Some(&[]))?.record.period_s();
             let part = table.beginning((left / period_s).ceil() as usize);
             left -= part.rows() as f64 * period_s;
             begun.push((file.clone(), part));
@@ -161,14 +161,15 @@ fn of_tables(
     rig: &Rig,
     tables: &[(PathBuf, RecordingTable)],
     reading: &Reading,
-    misread: &[Misreading],
+    misread: Option<&[Misreading]>,
 ) -> Result<Recorded, IdentifyError> {
     let (mut rows, mut is_driven, mut is_force) = (Vec::<RecordingRows>::new(), false, false);
     let fastest_s = fastest_period_s(chain_of(rig)?, reading.is_clamped)?;
     for (file, table) in tables {
         let at_file = |source: RecordingError| IdentifyError::Table { file: file.clone(), source };
-        let columns = RecordingColumns::of(rig, reading, table).map_err(at_file)?.reread(misread);
-        let pieces = columns.pieces(table, fastest_s).map_err(at_file)?;
+        let columns =
+            RecordingColumns::of(rig, reading, table).map_err(at_file)?.reread(misread.unwrap_or_default());
+        let pieces = columns.pieces(table, fastest_s, misread.is_none()).map_err(at_file)?;
         let period_s = pieces.first().map_or(0.0, |piece| piece.period_s);
         if let Some(first) = rows.first()
             && (period_s / first.period_s - 1.0).abs() > SAME_PERIOD

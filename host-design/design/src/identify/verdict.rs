@@ -51,7 +51,7 @@ pub struct Predicted {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
     /// The wiring differs from that of the file.
-    Wiring(WiringFound),
+    Wiring(Box<WiringFound>),
     /// The model does not explain the log.
     Misfit(String),
     /// The numbers are not physical: no machine has them.

@@ -8,7 +8,7 @@ use super::parameters::ParameterKind;
 const SCALES: core::ops::RangeInclusive<f64> = 0.75..=1.33;
 const COMMON: f64 = 1.2;
 /// Largest slope of a rail that is not named (rad), with so many deviations.
-const LEVEL_RAD: (f64, f64) = (0.02, 4.0);
+const LEVEL_RAD: (f64, f64) = (0.01, 4.0);
 
 /// What the estimates of a driven machine say of the file as a whole.
 pub(super) fn doubts(estimates: &[Estimate]) -> Vec<Doubt> {

@@ -97,7 +97,7 @@ pub(super) fn find_in_tables(
         (!record.pieces.is_empty()).then(|| part(record))
     };
     let (file, others) = wirings(model.layout.links + 1, model.is_imposed && is_driven, Some(said));
-    let Some(short) = undone(&file) else { return Ok(None) };
+    let short = part(beginning.reread(rig, &[])?.record);
     // Without bristles, a joint has no state of its own that a short part does not show.
     let model = Model { has_bristles: false, substeps: short.model(model.gravity).substeps, ..model.clone() };
     let search = WiringSearch { model: &model, priors, effort, undone: &undone, progress };

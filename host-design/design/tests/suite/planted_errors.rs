@@ -230,12 +230,12 @@ fn of_drives() -> Vec<Kind> {
         ("cart in mm", with(|row| row[1] *= 1e3), &["refused", "x_m gives 1000 times"]),
         ("joint in degrees", with(|row| row[2] = row[2].to_degrees()), &["refused", "in degrees"]),
         ("drive three rows early", late, &["written", "3 rows late"]),
-        ("drive doubled", with(|row| row[3] *= 2.0), &["2 times those of the file", "supply_v"]),
-        ("rail tilted", shaken_on(0.05), &["rail rises"]),
+        ("drive doubled", with(|row| row[3] *= 2.0), &["all about 2.1 times those of the file", "supply_v"]),
+        ("rail tilted", shaken_on(0.02), &["rail rises"]),
         (
             "gear ratio halved",
             of_file("gear_ratio = 3.71", "gear_ratio = 1.855"),
-            &["0.5 times those of the file"],
+            &["all about 0.53 times those of the file"],
         ),
         (
             "drive missing",

@@ -70,7 +70,7 @@ impl Swing {
             let k4 = rates(add(y, k3, STEP_S), hand);
             y = [0, 1, 2, 3].map(|i| y[i] + STEP_S / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
             if y[0] > self.stop && y[2] > 0.0 {
-                y[2] = -0.5 * y[2];
+                y[2] *= -0.5;
             }
         }
         all

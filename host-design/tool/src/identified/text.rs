@@ -358,3 +358,33 @@ fn windows_json(errors: &[WindowErrors]) -> Vec<Value> {
     };
     errors.iter().map(one).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use upright_design::identify::Refusal;
+
+    use super::*;
+
+    #[test]
+    fn a_number_that_no_machine_has_is_not_printed_with_a_refusal() {
+        let estimate =
+            |kind, new| Estimate { kind, old: 0.7, new, deviation: 0.1, halves: None, held_by_prior: false };
+        let mut found = Identification {
+            estimates: vec![
+                estimate(ParameterKind::TotalMass, -1.22),
+                estimate(ParameterKind::CartDry, -0.3),
+                estimate(ParameterKind::Length(0), f64::NAN),
+                estimate(ParameterKind::Tilt, -0.01),
+            ],
+            refusal: Some(Refusal::Misfit("does not fit".to_owned())),
+            ..Identification::default()
+        };
+        let text = super::text("m", &found, &Settings::default());
+        assert_eq!(text.matches("impossible").count(), 3, "{text}");
+        assert!(!text.contains("-1.22") && !text.contains("NaN") && text.contains("-0.01"), "{text}");
+        assert!(json("m", &found)["estimates"][0]["found"].is_null());
+        // The negative control: it is the refusal that hides them.
+        found.refusal = None;
+        assert!(super::text("m", &found, &Settings::default()).contains("-1.22"));
+    }
+}

@@ -1,5 +1,7 @@
 //! Rows at equal intervals, from rows whose times are uneven or of which some are missing.
 
+use core::f64::consts::TAU;
+
 use super::columns::RecordingColumns;
 use super::error::RecordingError;
 use super::plausible;
@@ -7,11 +9,19 @@ use super::text::RecordingTable;
 
 /// Times are uneven if they are off by more than this share of the period.
 const UNEVEN: f64 = 0.02;
+/// Uneven steps are at most by this share longer than the period; longer ones are gaps.
+const UNEVEN_STEP: f64 = 0.75;
+/// How far the period may be from the mean of uneven steps, as a share of it, and from how many rows it is found.
+const WIDEST: f64 = 0.05;
+const SCANNED: usize = 500;
 /// Longest time between two rows that is interpolated, in periods (one missing row, with uneven times), and as a share
 /// of the period of the fastest mode. A longer pause begins a new piece.
 const BRIDGED: (f64, f64) = (2.75, 0.125);
 /// Rows on each side of a time through which the interpolating polynomial goes.
 const SIDE: usize = 3;
+/// Largest error of a straight line, as a share of the motion, with which it is taken instead: between rows that are
+/// unevenly close a polynomial amplifies the steps of an encoder.
+const STRAIGHT: f64 = 1e-4;
 
 /// Consecutive rows at equal intervals.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,7 +40,7 @@ pub(in crate::identify) struct RecordingRows {
 
 impl RecordingColumns {
     /// The measurements of a table, in pieces without a long gap; the fastest mode of the links has the period
-    /// `fastest_s`.
+    /// `fastest_s`. The values are compared with the reading if `is_checked`.
     ///
     /// # Errors
     /// [`RecordingError`] if times do not increase or the values contradict the reading.
@@ -38,6 +48,7 @@ impl RecordingColumns {
         &self,
         table: &RecordingTable,
         fastest_s: f64,
+        is_checked: bool,
     ) -> Result<Vec<RecordingRows>, RecordingError> {
         let times = self.times(table)?;
         let period_s = self.period_s.unwrap_or_else(|| period(&times));
@@ -45,13 +56,15 @@ impl RecordingColumns {
             return Err(RecordingError::Empty);
         }
         let deviations = self.deviations(table);
-        plausible::check(self, table, &times, &deviations)?;
+        if is_checked {
+            plausible::check(self, table, &times, &deviations)?;
+        }
         let longest_s = (BRIDGED.0 * period_s).max(BRIDGED.1 * fastest_s);
         let mut pieces = Vec::new();
         let mut from = 0;
         for to in 1..=times.len() {
             if to == times.len() || times[to] - times[to - 1] > longest_s {
-                pieces.push(self.piece(table, &times, &deviations, from..to, period_s));
+                pieces.push(self.piece(table, &times, &deviations, from..to, [period_s, fastest_s]));
                 from = to;
             }
         }
@@ -86,7 +99,7 @@ impl RecordingColumns {
         times: &[f64],
         y: &[f64],
         range: core::ops::Range<usize>,
-        period_s: f64,
+        [period_s, fastest_s]: [f64; 2],
     ) -> RecordingRows {
         let (channels, start) = (self.angles.len() + 1, times[range.start]);
         let drive = |row: usize| self.drive.map(|(index, factor)| factor * table.row(row)[index]);
@@ -112,7 +125,10 @@ impl RecordingColumns {
                 row += 1;
             }
             if row + 1 < times.len() {
-                let weights = weights(times, row, time, period_s);
+                // Of a sine with the period of the fastest mode.
+                let bend = (TAU * (times[row + 1] - times[row]) / fastest_s).powi(2) / 8.0;
+                let side = if bend < STRAIGHT { 1 } else { SIDE };
+                let weights = weights(times, row, time, (period_s, side));
                 let of = |channel: usize| {
                     weights.iter().map(|(row, weight)| weight * y[row * channels + channel]).sum::<f64>()
                 };
@@ -124,42 +140,52 @@ impl RecordingColumns {
     }
 }
 
-/// Time from one row to the next (s): the median, or with uneven times the mean without pauses.
+/// Time from one row to the next (s): the median, or with uneven times that of the grid on which they lie best.
 fn period(times: &[f64]) -> f64 {
-    let median = plausible::median(times.windows(2).map(|pair| pair[1] - pair[0]));
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
-    let is_near = |step: &f64| (step / median - 1.0).abs() < 0.75;
-    match steps().filter(is_near).all(|step| (step / median - 1.0).abs() <= UNEVEN) {
-        true => median,
-        false => steps().filter(is_near).sum::<f64>() / steps().filter(is_near).count().max(1) as f64,
+    let median = plausible::median(steps());
+    let near: Vec<f64> = steps().filter(|step| step / median < 1.0 + UNEVEN_STEP).collect();
+    if near.iter().all(|step| (step / median - 1.0).abs() <= UNEVEN) {
+        return median;
     }
+    let mean = near.iter().sum::<f64>() / near.len() as f64;
+    let count = times.len().min(SCANNED);
+    let fineness = 1.0 / (8.0 * count as f64);
+    let tried = (-(WIDEST / fineness) as i64..=(WIDEST / fineness) as i64)
+        .map(|at| mean * (1.0 + at as f64 * fineness));
+    let coherence = |period_s: f64| {
+        let [cosine, sine] = direction(&times[..count], period_s);
+        cosine.hypot(sine)
+    };
+    let best =
+        tried.map(|period_s| (coherence(period_s), period_s)).max_by(|one, other| one.0.total_cmp(&other.0));
+    best.map_or(mean, |(_, period_s)| period_s)
 }
 
-/// Number of missing rows, and how far the times are from those of the nearest row of an even grid (rms, s).
+/// Sum of the unit vectors of `times` on the circle of one period.
+fn direction(times: &[f64], period_s: f64) -> [f64; 2] {
+    times.iter().fold([0.0; 2], |[cosine, sine], time| {
+        let phase = libm::sincos(TAU * (time - times[0]) / period_s);
+        [cosine + phase.1, sine + phase.0]
+    })
+}
+
+/// Number of missing rows, and how far the times are from those of an even grid (rms, s).
 fn unevenness(times: &[f64], period_s: f64) -> (u64, f64) {
-    let (mut missing, mut grid, mut sum) = (0u64, 0u64, 0.0);
-    let mut off = Vec::with_capacity(times.len());
-    for (row, time) in times.iter().enumerate() {
-        if row > 0 {
-            let steps = ((time - times[row - 1]) / period_s + 0.25).floor().max(1.0) as u64;
-            missing += steps - 1;
-            grid += steps;
-        }
-        let error = time - times[0] - grid as f64 * period_s;
-        off.push(error);
-        sum += error;
-    }
-    let mean = sum / times.len() as f64;
-    let squares: f64 = off.iter().map(|error| (error - mean).powi(2)).sum();
-    (missing, (squares / times.len() as f64).sqrt())
+    let [cosine, sine] = direction(times, period_s);
+    let offset_s = times[0] + period_s * libm::atan2(sine, cosine) / TAU;
+    let row = |time: &f64| ((time - offset_s) / period_s).round();
+    let squares: f64 = times.iter().map(|time| (time - offset_s - row(time) * period_s).powi(2)).sum();
+    let all = row(&times[times.len() - 1]) - row(&times[0]) + 1.0;
+    ((all - times.len() as f64).max(0.0) as u64, (squares / times.len() as f64).sqrt())
 }
 
-/// Rows and their weights in the value at `time`, between `row` and the next one: the polynomial through the rows
-/// around (Lagrange). Around a gap the rows are as far apart as half of the gap, so that noise is not amplified.
-fn weights(times: &[f64], row: usize, time: f64, period_s: f64) -> Vec<(usize, f64)> {
+/// Rows and their weights in the value at `time`, between `row` and the next one: the polynomial through `side` rows on
+/// either side (Lagrange). Around a gap the rows are as far apart as half of the gap, so that noise is not amplified.
+fn weights(times: &[f64], row: usize, time: f64, (period_s, side): (f64, usize)) -> Vec<(usize, f64)> {
     let apart = (((times[row + 1] - times[row]) / (2.0 * period_s)).round() as usize).max(1);
-    let low = (0..SIDE).map_while(|step| row.checked_sub(step * apart));
-    let high = (0..SIDE).map(|step| row + 1 + step * apart).take_while(|row| *row < times.len());
+    let low = (0..side).map_while(|step| row.checked_sub(step * apart));
+    let high = (0..side).map(|step| row + 1 + step * apart).take_while(|row| *row < times.len());
     let nodes: Vec<usize> = low.chain(high).collect();
     let weight = |&node: &usize| {
         let others = nodes.iter().filter(|other| **other != node);
@@ -195,7 +221,7 @@ mod tests {
 
     fn pieces(text: &str, reading: &Reading) -> Result<Vec<RecordingRows>, RecordingError> {
         let table = RecordingTable::from_text(text, reading, 2)?;
-        RecordingColumns::of(&rig(), reading, &table)?.pieces(&table, 0.4)
+        RecordingColumns::of(&rig(), reading, &table)?.pieces(&table, 0.4, true)
     }
 
     #[test]
@@ -271,7 +297,7 @@ mod tests {
                 let time = at as f64 * period_s;
                 let row = times.iter().rposition(|&t| t <= time).unwrap();
                 let value: f64 = match side {
-                    true => weights(&times, row, time, period_s)
+                    true => weights(&times, row, time, (period_s, SIDE))
                         .iter()
                         .map(|(row, weight)| weight * (rate * times[*row]).sin())
                         .sum(),

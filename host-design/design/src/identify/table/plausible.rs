@@ -11,6 +11,8 @@ use super::text::RecordingTable;
 const CLAMPED_COUNTS: f64 = 10.0;
 /// Largest distance from hanging of the middle of a free swing, for a unit or a zero to be named (rad).
 const HANGS_RAD: f64 = 0.5;
+/// A free swing around hanging is within this angle of it (rad) for at least this share of the time.
+const LOW: (f64, f64) = (0.35, 0.01);
 /// Time over which differences are taken to see whether a value stands still or jumps (s).
 const LAG_S: f64 = 0.01;
 /// A value that stops within a row has an acceleration of more than so many times the usual one.
@@ -49,10 +51,16 @@ fn at(table: &RecordingTable, row: usize, index: usize, what: String, remedy: &s
 /// Without a drive, link 1 hangs in the middle of its motion.
 fn hangs(columns: &RecordingColumns, table: &RecordingTable, y: &[f64]) -> Result<(), RecordingError> {
     let wrapped = |angle: f64| angle - TAU * (angle / TAU).round();
-    let middle = median(y.iter().skip(1).step_by(columns.angles.len() + 1).map(|angle| wrapped(*angle)));
-    if columns.drive.is_some() || middle.abs() <= PI / 2.0 {
+    let (mut sine, mut cosine, mut count, mut low) = (0.0, 0.0, 0, 0);
+    for angle in y.iter().skip(1).step_by(columns.angles.len() + 1) {
+        (sine, cosine, count) = (sine + libm::sin(*angle), cosine + libm::cos(*angle), count + 1);
+        low += usize::from(wrapped(*angle).abs() < LOW.0);
+    }
+    // The mean direction alone would refuse large swings, which spend most of their time high up.
+    if columns.drive.is_some() || cosine >= 0.0 || low as f64 > LOW.1 * f64::from(count) {
         return Ok(());
     }
+    let middle = libm::atan2(sine, cosine);
     let (index, factor) = columns.angles[0];
     let (now, other, zero) = match columns.zero {
         AngleZero::Upright => ("upright", "hanging", PI),
