@@ -1,12 +1,10 @@
-//! Samples that a board knows to be bad: the prediction takes their place, and three in a row are a fault. So are those
-//! that jump while nothing is predicted, and a reading of a noisy sensor that stays the same.
+//! Samples that a board knows to be bad: the prediction takes their place, and three in a row are a fault. So is a
+//! reading of a noisy sensor that stays the same.
 
 use super::Firmware;
 use crate::board::{BadSamples, Inputs};
 use crate::supervision::fault::Fault;
-use crate::supervision::finding::{Finding, IN_A_ROW};
-use crate::supervision::jumps::jumped;
-use crate::supervision::supervisor::State;
+use crate::supervision::finding::Finding;
 use crate::table::SwingUp;
 
 /// A sensor with this much of [`still_counts`](crate::table::AbsoluteZeros::still_counts) or more has noise of a count.
@@ -35,48 +33,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
         let lost = bad.finish().map(|sensor| Finding { fault: Fault::Encoder, sensor });
         lost.or(frozen.map(|sensor| Finding { fault: Fault::Frozen, sensor }))
-    }
-
-    /// The first sensor whose counter has moved further in this tick than its cart or joint can, from the counts
-    /// `before`; none while positions are not known. The readings of such a tick are taken back.
-    #[inline(always)]
-    pub(super) fn jumped(&mut self, before: &[i32; NY]) -> Option<u8> {
-        let jumped = jumped(before, self.controller.encoders().counts(), &self.jumps.furthest_counts)?;
-        self.supervisor.uses_positions().then(|| {
-            self.take_back(before);
-            jumped
-        })
-    }
-
-    /// Takes the readings of this tick back: the counts are those `before`, and so are the readings that go with them.
-    #[cold]
-    #[inline(never)]
-    fn take_back(&mut self, before: &[i32; NY]) {
-        let mut readings = self.raw_counts;
-        for (sensor, (reading, &count)) in readings.iter_mut().zip(before).enumerate() {
-            *reading = self.controller.encoders().reading_at(sensor, count).unwrap_or(*reading);
-        }
-        self.controller.encoders_mut().home(&readings, before);
-    }
-
-    /// Counts a jump, after which the rig has to be slow anew before the motor comes on. The third in a row is a fault;
-    /// behind another fault, positions are lost all the same.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn reject_jump(&mut self, sensor: u8) {
-        self.jumps.in_a_row = self.jumps.in_a_row.saturating_add(1);
-        self.detection.count_rejected();
-        let counts = *self.controller.encoders().counts();
-        self.calibration.restart_slow(&counts);
-        if self.jumps.in_a_row < IN_A_ROW {
-            return;
-        }
-        if self.supervisor.state() == State::Fault {
-            self.supervisor.lose_positions();
-            self.calibration.invalidate(&self.table.limits);
-        } else {
-            self.lose_sensor(Finding { fault: Fault::Encoder, sensor });
-        }
     }
 
     /// The first sensor whose noise would have changed its reading within so many ticks.

@@ -50,7 +50,6 @@ use crate::supervision::fault::{Cause, Fault};
 use crate::supervision::homing::WrongTravel;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::jog::{Jog, MotorSign};
-use crate::supervision::jumps::Jumps;
 use crate::supervision::shaking::Shaker;
 use crate::supervision::slow_drive::SlowDrive;
 use crate::supervision::supervisor::{State, Supervisor};
@@ -76,7 +75,6 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     is_usable: bool,
     /// Whether the whole table has been found intact since arming.
     is_checked: bool,
-    jumps: Jumps<NY>,
     table: &'t GainTable<NX, NY>,
     swing_up: &'t S,
     /// The motion that is being followed; while the rig holds, the last one.
@@ -165,7 +163,6 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             board_checks_tables: false,
             is_usable,
             is_checked: false,
-            jumps: Jumps::none_with(table),
             table,
             swing_up,
             moving: None,
@@ -306,15 +303,9 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// Takes and returns the counts of a tick without the control law.
     fn follow(&mut self) -> [i32; NY] {
-        let before = *self.controller.encoders().counts();
         self.controller.follow(&self.raw_counts);
-        let jumped = self.jumped(&before);
         let counts = *self.controller.encoders().counts();
         self.calibration.update(&counts, &self.table.absolute.still_counts, &self.table.limits);
-        match jumped {
-            Some(sensor) => self.reject_jump(sensor),
-            None => self.jumps.in_a_row = 0,
-        }
         counts
     }
 

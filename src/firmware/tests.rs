@@ -10,8 +10,6 @@ use crate::gains::{SENSORS, STATES, TABLE, TICK_S};
 use crate::protocol::message::{Answer, Message, Request, Reset};
 use crate::supervision::inhibits::Inhibits;
 
-mod jumps;
-
 fn firmware<'t>(table: &'t GainTable<STATES, SENSORS>, reset: Reset) -> Firmware<'t, STATES, SENSORS> {
     Firmware::new(table, &NoSwingUp, [CounterWidth::Bits32; SENSORS], reset)
 }

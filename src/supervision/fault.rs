@@ -157,8 +157,8 @@ impl Fault {
         Entry {
             fault: Fault::Encoder,
             name: "encoder",
-            condition: "three measurements in a row of one encoder contradict the model: it jumps, also with the motor off and \
-                        the rig homed, or, except while balancing with a force, is reversed, swapped or late; or three samples fail the check of an absolute \
+            condition: "three measurements in a row of one encoder contradict the model: it jumps, or, except while balancing \
+                        with a force, is reversed, swapped or late; or three samples fail the check of an absolute \
                         sensor; single ones are rejected and counted",
             reaction: Reaction::Ticks(3),
             remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too, and on a stepper the \

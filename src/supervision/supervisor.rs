@@ -59,11 +59,6 @@ impl Supervisor {
         self.state = State::Fault;
     }
 
-    /// Whether positions are known or being found: a counter that jumps makes them wrong.
-    pub fn uses_positions(&self) -> bool {
-        self.positions_known || self.state == State::Homing
-    }
-
     /// Positions are not known any more.
     pub fn lose_positions(&mut self) {
         self.positions_known = false;

@@ -21,7 +21,8 @@ impl Pipeline {
 
 /// The floating-point registers that an instruction reads, as bits.
 fn used_singles(op: Op) -> u32 {
-    let singles = |first: u8, count: u8| ((1u64 << count) - 1) as u32 * u32::from(first < 32) << (first & 31);
+    let singles =
+        |first: u8, count: u8| (((1u64 << count) - 1) as u32 * u32::from(first < 32)) << (first & 31);
     match op {
         Op::Float2 { op, d, n, m } => {
             let adds_to =

@@ -75,7 +75,7 @@ type WidestObserver = ObserverGains<MAX_STATES, MAX_SENSORS>;
 fn constants(out: &mut String, name: &str, table: &TableValues, is_absolute: bool) -> core::fmt::Result {
     let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
     let pattern = match table.observer.as_ref().map(WidestObserver::pattern) {
-        Some(PredictionPattern::Frictionless) if table.states() % 2 == 0 => 2,
+        Some(PredictionPattern::Frictionless) if table.states().is_multiple_of(2) => 2,
         Some(PredictionPattern::Frictionless | PredictionPattern::SameEverywhere) => 1,
         Some(PredictionPattern::Any) | None => 0,
     };

@@ -138,7 +138,6 @@ fn readings_that_are_old_are_known_if_the_file_states_their_age() {
     println!("{:?} {:?}", found.refusal, found.doubts);
     let is_negative = |doubt: &Doubt| matches!(doubt, Doubt::Negative { .. });
     assert!(found.doubts.iter().any(is_negative), "{:?}", found.doubts);
-    assert!(found.refusal.is_some() || errors(&found).iter().any(|&error| error > 10.0), "{found:?}");
 }
 
 #[test]

@@ -120,7 +120,10 @@ fn doubts(law: TrueFriction, number: u64) -> Vec<Doubt> {
     let machine = DrawnMachine::draw(&file, 10.0, law, 5, number).unwrap();
     let log = shake(&machine.rig, 12.0, number).unwrap();
     let settings = Settings { trust_wiring: true, ..Settings::default() };
-    identify(&file, &[(PathBuf::from("run.log"), log)], &settings, &|_| ()).unwrap().doubts
+    let mut doubts = identify(&file, &[(PathBuf::from("run.log"), log)], &settings, &|_| ()).unwrap().doubts;
+    // A drawn machine has another travel per count than its file, which is told.
+    doubts.retain(|doubt| !matches!(doubt, Doubt::Travel { .. }));
+    doubts
 }
 
 #[test]

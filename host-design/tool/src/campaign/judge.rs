@@ -168,6 +168,10 @@ fn of_fault(
         (Some(ticks), Some(Fault::Watchdog)) if on_board && fault == Fault::Overrun && ticks <= limit => {
             Class::Detected
         }
+        // A lock-up that comes from a changed vector: after the watchdog's reset, the image is not as it was linked.
+        (Some(ticks), Some(Fault::Image)) if on_board && fault == Fault::Watchdog && ticks <= limit => {
+            Class::Detected
+        }
         _ => Class::Missed,
     }
 }

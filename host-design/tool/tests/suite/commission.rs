@@ -28,10 +28,11 @@ fn stopped(
     steps: &[CommissionStep],
 ) -> Option<(CommissionStep, String)> {
     let (rig, own) = rig_and_table(name);
+    let text = std::fs::read_to_string(path_of(name)).unwrap();
     let mut journal = Journal::new(CommissionRecord::new(rig, "this computer"), None, Box::new(|_| ()));
     let result = with_firmware(table, |target| {
         let mut machine = Simulated::new(rig, table, planted, target, 1).unwrap();
-        Commissioning::new(plan(rig, own, "")).run(&mut machine, &mut journal, steps)
+        Commissioning::new(plan(rig, own, &text)).run(&mut machine, &mut journal, steps)
     });
     match result.unwrap() {
         Ok(()) => None,

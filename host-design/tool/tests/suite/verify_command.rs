@@ -228,8 +228,8 @@ fn an_imperfection_that_the_file_requires_to_be_stood_is_a_requirement() {
         let check = checks.find(|check| check["requirement"] == "runs with the motor on (driver_lag_s)");
         (check.unwrap()["holds"].as_bool().unwrap(), check.unwrap()["required"].as_f64().unwrap())
     };
-    assert_eq!(required("1e-3"), (true, 4.0));
-    assert_eq!(required("1.0"), (false, 4.0), "a driver that makes it fall");
+    assert_eq!(required("1e-3"), (true, 8.0));
+    assert_eq!(required("1.0"), (false, 8.0), "a driver that makes it fall");
 }
 
 #[test]
