@@ -4,6 +4,10 @@ use super::model::Model;
 use super::parameters::ParameterKind;
 use crate::number::significant;
 
+/// Nothing is written of frictions that are this many of their deviations below 0. With three, 2 of 40 sound machines
+/// were refused, with four, none.
+const FAR_BELOW_0: f64 = 4.0;
+
 /// A reason to doubt an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
@@ -78,6 +82,13 @@ pub enum Doubt {
         /// Errors (rms) in percent of the range, with the numbers found and with the new file.
         percent: [f64; 2],
     },
+    /// Measurements are between the counts that the sensor gives.
+    BetweenCounts {
+        /// The cart, or a joint from 1.
+        channel: String,
+        /// Share of the small differences that are no whole counts.
+        share: f64,
+    },
     /// Recordings that were not used are not predicted.
     Unpredicted {
         /// The cart, or a joint from 1.
@@ -93,9 +104,16 @@ pub enum Doubt {
 
 impl Doubt {
     /// Whether nothing is written unless the user trusts the numbers nevertheless. The law of friction alone is no
-    /// reason: the deviations allow for it.
+    /// reason: the deviations allow for it. Nor are measurements between two counts: a camera has none.
     pub fn needs_trust(&self) -> bool {
-        !matches!(self, Doubt::LargerAtRest(_) | Doubt::NeverSticks(_) | Doubt::Tilted(_))
+        match self {
+            Doubt::Negative { value, deviation, .. } => *value < -FAR_BELOW_0 * deviation,
+            Doubt::LargerAtRest(_)
+            | Doubt::NeverSticks(_)
+            | Doubt::Tilted(_)
+            | Doubt::BetweenCounts { .. } => false,
+            _ => true,
+        }
     }
 
     /// What the model's law of friction says, if it is not that of the simulated machine of a rig file.
@@ -188,6 +206,13 @@ impl Doubt {
                 capital(*kind),
                 significant(*value, 3),
                 significant(*deviation, 2)
+            ),
+            Doubt::BetweenCounts { channel, share } => write!(
+                f,
+                "{:.0} % of the small differences of {channel} are no whole counts of the sensor in the file: it is another sensor, \
+                 or the values were smoothed or interpolated. Smoothed values hide fast motion, and friction is found too large: \
+                 record the counts.",
+                100.0 * share
             ),
             Doubt::Far { kind, deviations } => write!(
                 f,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::at_rest;
 use super::channel::chain_of;
+use super::counted;
 use super::covariance::{changes, deviations};
 use super::creeping;
 use super::doubt::Doubt;
@@ -130,6 +131,8 @@ pub fn identify_recordings(
         }
     }
     let to_write = ToWrite { rig, chain, text, weighed_kg_m: settings.weighed_kg_m };
+    let are_as_recorded = rows.is_some_and(|rows| rows.uneven_s == 0.0);
+    let between_counts = if are_as_recorded { counted::doubts(&record) } else { Vec::new() };
     let written = if is_driven {
         driven(&model, (record, finer), &priors, &to_write, &mut found, progress)?
     } else {
@@ -143,6 +146,7 @@ pub fn identify_recordings(
     };
     let errors = |recordings| predicted(rig, &model, &priors, &written, recordings);
     found.predicted = predict.map_or(Ok(Vec::new()), errors)?;
+    found.doubts.extend(between_counts);
     decide(&mut found);
     Ok(found)
 }

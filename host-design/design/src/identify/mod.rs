@@ -31,6 +31,7 @@ mod at_rest;
 mod cart_force;
 mod channel;
 mod convert;
+mod counted;
 mod covariance;
 mod coverage;
 mod creeping;

@@ -9,8 +9,8 @@ use super::record::Record;
 use super::window_errors::WindowErrors;
 
 /// A friction this many of its deviations below 0 is doubted. If the 11 frictions and drags of three links are all 0,
-/// one of them comes out below 2 deviations in 22 % of sound machines, and below 3 in 1.5 %.
-const NEGATIVE: f64 = 3.0;
+/// one of them is so in 22 % of sound machines: nothing is refused for it before [`Doubt::needs_trust`].
+const NEGATIVE: f64 = 2.0;
 /// A value this many prior deviations away from the file is doubted.
 const FAR: f64 = 5.0;
 /// Least error of the travel per count that is doubted: a share, and in its deviations.
@@ -137,8 +137,17 @@ mod tests {
     #[test]
     fn a_value_is_doubted_if_it_is_negative_or_far_from_the_file() {
         let dry = ParameterKind::JointDry(0);
-        assert!(matches!(doubted(dry, 0.0, 0.1, -0.31)[..], [Doubt::Negative { .. }]));
-        assert_eq!(doubted(dry, 0.0, 0.1, -0.29), []);
+        let needs_trust = |unbounded: f64| match &doubted(dry, 0.0, 0.1, unbounded)[..] {
+            [negative @ Doubt::Negative { .. }] => Some(negative.needs_trust()),
+            doubts => {
+                assert_eq!(doubts, []);
+                None
+            }
+        };
+        assert_eq!(
+            [-0.41, -0.39, -0.21, -0.19].map(needs_trust),
+            [Some(true), Some(false), Some(false), None]
+        );
         let moment = ParameterKind::SecondMoment(0);
         assert!(
             matches!(doubted(moment, 3.6, 0.1, 3.6)[..], [Doubt::Far { deviations, .. }] if deviations > 5.0)

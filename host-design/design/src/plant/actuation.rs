@@ -28,8 +28,13 @@ pub trait Actuation {
 /// `dt`, `x⁵ exp(-x) / (120 n⁴)` is left at its end after n steps, with `x = rate dt`.
 pub(crate) fn integration_steps(rate: f64, dt: f64, least: usize) -> usize {
     let x = rate * dt;
-    let by_error = (x.powi(5) * libm::exp(-x) / (120.0 * ACCURACY)).sqrt().sqrt();
-    by_error.max(x / LARGEST_SHARE).ceil().max(least.max(1) as f64) as usize
+    let least = least.max(1);
+    let to_fourth = |decay: f64| x.powi(5) * decay / (120.0 * ACCURACY);
+    // A usual motor is slow enough: then, the exponential need not be computed.
+    if x <= LARGEST_SHARE * least as f64 && to_fourth(1.0) <= (least as f64).powi(4) {
+        return least;
+    }
+    to_fourth(libm::exp(-x)).sqrt().sqrt().max(x / LARGEST_SHARE).ceil().max(least as f64) as usize
 }
 
 #[cfg(test)]

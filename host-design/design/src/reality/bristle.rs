@@ -109,6 +109,24 @@ impl Bristle {
         self.moved(deflection, travel, speed).deflection
     }
 
+    /// Whether its force has a kink between two deflections with these speeds (m/s or rad/s): the contact turns round, or
+    /// passes the end of the elastic zone or the beginning of sliding.
+    #[inline]
+    pub fn has_passed_a_kink(&self, deflections: [f64; 2], speeds: [f64; 2]) -> bool {
+        let zone = |at: usize| {
+            let bent = deflections[at].abs();
+            (bent < self.elastic, bent < self.sliding(speeds[at]))
+        };
+        speeds[0] * speeds[1] < 0.0 || zone(0) != zone(1)
+    }
+
+    /// z_ss: the deflection while the contact slides at this speed (m or rad).
+    #[inline]
+    fn sliding(&self, speed: f64) -> f64 {
+        let ratio = speed / self.stribeck;
+        self.coulomb * (1.0 + self.excess / (1.0 + ratio * ratio))
+    }
+
     /// Elastic energy of the bent bristle (J).
     pub fn energy(&self, deflection: f64) -> f64 {
         0.5 * self.stiffness * deflection * deflection
@@ -117,8 +135,7 @@ impl Bristle {
     #[inline]
     fn moved(&self, deflection: f64, travel: f64, speed: f64) -> Moved {
         let direction = 1f64.copysign(if travel == 0.0 { speed } else { travel });
-        let ratio = speed / self.stribeck;
-        let sliding = self.coulomb * (1.0 + self.excess / (1.0 + ratio * ratio));
+        let sliding = self.sliding(speed);
         if self.law == FrictionLaw::Dahl {
             // dz/dx = 1 - z sgn(v) / z_ss, exactly.
             let off = (deflection - direction * sliding) * libm::exp(-travel.abs() / sliding);

@@ -18,6 +18,8 @@ use crate::rig::{CartInput, Chain, Rig};
 /// Largest phase (rad) by which the fastest stuck contact may advance in a step. A Runge–Kutta step then has an error
 /// of about 1e-5 of the contact's swing; half of this phase changes the runs less than another seed does.
 const LARGEST_PHASE: f64 = 0.25;
+/// Number of steps instead of one in which a contact turns round or begins to slide.
+const AT_A_KINK: usize = 4;
 
 /// A chain with dry friction, air drag, belt and tilted rail.
 ///
@@ -200,6 +202,53 @@ impl<const N: usize> RealChain<N> {
         }
         self.motion = to;
     }
+
+    /// Integrates over `dt` (s) in `steps` steps. The friction has a kink where a contact turns round, or begins to
+    /// slide: a step in which that happens is done again in [`AT_A_KINK`] shorter ones.
+    #[inline]
+    fn integrate(
+        &mut self,
+        steps: usize,
+        dt: f64,
+        disturbances: &[f64],
+        inputs: impl Fn(f64, f64) -> [f64; 3],
+        force: impl Fn(f64, f64) -> f64,
+    ) {
+        assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
+        let torques = core::array::from_fn(|j| disturbances[j]);
+        let step_s = dt / steps as f64;
+        for step in 0..steps {
+            let (from, bent) = (self.motion, self.bent);
+            let advance = |machine: &mut Self, from_s: f64, step_s: f64| {
+                let inputs = inputs(from_s, step_s);
+                machine.step(|node, speed| force(inputs[node], speed), &torques, step_s);
+            };
+            let from_s = step as f64 * step_s;
+            advance(self, from_s, step_s);
+            if !self.has_passed_a_kink(&from, &bent) {
+                continue;
+            }
+            (self.motion, self.bent) = (from, bent);
+            let piece_s = step_s / AT_A_KINK as f64;
+            for piece in 0..AT_A_KINK {
+                advance(self, from_s + piece as f64 * piece_s, piece_s);
+            }
+        }
+    }
+
+    /// Whether a contact has turned round or begun to slide since the state `from`, where the bristles were `bent`.
+    #[inline]
+    fn has_passed_a_kink(&self, from: &Motion<N>, bent: &([f64; N], f64)) -> bool {
+        let cart = self.cart.as_ref().is_some_and(|bristle| {
+            let speeds = [from.chain.xdot, self.motion.chain.xdot];
+            bristle.has_passed_a_kink([bent.1, self.bent.1], speeds)
+        });
+        cart || self.joints.as_ref().is_some_and(|joints| {
+            let before = relative(&from.chain.phidot, &[0.0; N]);
+            let now = relative(&self.motion.chain.phidot, &[0.0; N]);
+            (0..N).any(|j| joints[j].has_passed_a_kink([bent.0[j], self.bent.0[j]], [before[j], now[j]]))
+        })
+    }
 }
 
 /// Change of each joint's angle when the links turn from the absolute angles `from` to `to`.
@@ -294,23 +343,14 @@ impl<const N: usize> Plant for RealChain<N> {
     }
 
     fn advance(&mut self, force: f64, disturbances: &[f64], dt: f64, substeps: usize) {
-        assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
-        let torques = core::array::from_fn(|j| disturbances[j]);
         let steps = (dt / self.longest_step_s).ceil().max(substeps.max(1) as f64);
-        for _ in 0..steps as u64 {
-            self.step(|_, _| force, &torques, dt / steps);
-        }
+        self.integrate(steps as usize, dt, disturbances, |_, _| [force; 3], |force, _| force);
     }
 
     fn advance_with(&mut self, actuation: &dyn Actuation, disturbances: &[f64], dt: f64, substeps: usize) {
-        assert_eq!(disturbances.len(), N, "a chain of {N} links has {N} joint torques");
-        let torques = core::array::from_fn(|j| disturbances[j]);
         let steps = self.steps(actuation.damping_n_s_per_m(), dt, substeps);
-        let step_s = dt / steps as f64;
-        for step in 0..steps {
-            let inputs = actuation.inputs(step as f64 * step_s, step_s);
-            self.step(|node, speed| actuation.force_n(inputs[node], speed), &torques, step_s);
-        }
+        let inputs = |from_s: f64, step_s: f64| actuation.inputs(from_s, step_s);
+        self.integrate(steps, dt, disturbances, inputs, |input, speed| actuation.force_n(input, speed));
     }
 
     fn steps(&self, damping_n_s_per_m: f64, dt: f64, substeps: usize) -> usize {

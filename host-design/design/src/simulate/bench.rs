@@ -352,7 +352,6 @@ impl Bench {
     /// at its start (N).
     fn advance(&mut self, drive: Drive, disturbance: f64, length_s: f64) -> f64 {
         let substeps = self.substeps_in(length_s);
-        let speed = self.motor_speed();
         let Some(driver) = &mut self.driver else {
             let force = commanded_n(drive);
             self.plant.advance(force + disturbance, &self.torques, length_s, substeps);
@@ -360,17 +359,11 @@ impl Bench {
             return force;
         };
         let acting = driver.acting(drive, disturbance);
-        let at_start = acting.first_n(speed);
+        let at_start = acting.first_n(motor_speed(self.plant.as_ref(), &self.state));
         self.plant.advance_with(&acting, &self.torques, length_s, substeps);
         self.plant.write_state(&mut self.state);
-        let speed = self.motor_speed();
-        self.driver.iter_mut().for_each(|driver| driver.finish(drive, length_s, speed));
+        driver.finish(drive, length_s, motor_speed(self.plant.as_ref(), &self.state));
         at_start
-    }
-
-    /// Speed of the motor, converted to speed of the cart (m/s).
-    fn motor_speed(&self) -> f64 {
-        self.plant.motor_speed().or(self.state.get(1).copied()).unwrap_or_default()
     }
 
     /// Number of integration steps in a part of a tick, in proportion to its length (s).
@@ -380,6 +373,11 @@ impl Bench {
         }
         (self.substeps as f64 * length_s / self.period_s).ceil().max(1.0) as usize
     }
+}
+
+/// Speed of the motor, converted to speed of the cart (m/s).
+fn motor_speed(plant: &dyn Plant, state: &[f64]) -> f64 {
+    plant.motor_speed().or(state.get(1).copied()).unwrap_or_default()
 }
 
 /// Checks that a motor's speed can be followed within a tick.

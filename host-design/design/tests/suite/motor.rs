@@ -134,11 +134,10 @@ fn a_winding_delays_the_force_as_its_closed_form_says() {
 /// integration steps per tick instead of `steps`.
 fn change(rig: &Rig, [steps, more]: [usize; 2], duration_s: f64) -> f64 {
     let table = table(rig);
-    let is_moved = rig.actuator.acceleration.is_some();
     let run = |substeps: usize| {
         let mut scenario = Scenario { substeps, duration_s, ..Scenario::acceptance(rig, Law::Lqr, 0.1) };
-        // The bits of an encoder turn any difference into one of a count. A drive with pulses knows nothing else.
-        scenario.sensing = if is_moved { Sensing::Encoders } else { Sensing::FullState };
+        // The bits of an encoder turn any difference into one of a count.
+        scenario.sensing = Sensing::FullState;
         scenario.step_m *= 0.4;
         // The whole state is measured in f32: of links that hardly move, its rounding would be a larger share.
         scenario.start[2..].iter_mut().step_by(2).for_each(|angle| *angle = 0.002);
@@ -156,26 +155,51 @@ fn change(rig: &Rig, [steps, more]: [usize; 2], duration_s: f64) -> f64 {
     (0..rig.states()).map(of_state).fold(0.0, f64::max)
 }
 
+/// The same for a drive that takes pulses, as the sum of what changes in each tick of the same second. The loop does not
+/// act on a difference below a pulse, so that of two runs even one of rounding would grow as that of falling links.
+fn change_in_all_ticks(rig: &Rig, [steps, more]: [usize; 2]) -> f64 {
+    let step_m = rig.actuator.acceleration.as_ref().unwrap().step_m;
+    let scenario = Scenario { duration_s: 1.0, ..Scenario::acceptance(rig, Law::Lqr, 0.1) };
+    let (trace, summary) = simulate(rig, &table(rig), &scenario).unwrap();
+    assert!(summary.survives(), "{}: {summary}", rig.name);
+    let path: Vec<_> = trace.samples().map(|sample| sample.state.to_vec()).collect();
+    let [mut few, mut many] =
+        [steps, more].map(|substeps| Bench::new(rig, &Scenario { substeps, ..scenario.clone() }).unwrap());
+    let mut sums = vec![0.0; rig.states()];
+    for pair in path.windows(2) {
+        let pulses = ((pair[1][0] - pair[0][0]) / step_m).round() as i32;
+        for bench in [&mut few, &mut many] {
+            bench.hold(&pair[0]);
+            bench.tick(Drive::Steps(pulses));
+        }
+        for (sum, (a, b)) in sums.iter_mut().zip(few.state().iter().zip(many.state())) {
+            *sum += (a - b).abs();
+        }
+    }
+    let largest = |state: usize| path.iter().map(|at| at[state].abs()).fold(0.0, f64::max);
+    (0..rig.states()).map(|state| sums[state] / largest(state)).fold(0.0, f64::max)
+}
+
 #[test]
 fn no_number_of_integration_steps_decides_how_a_rig_balances() {
-    for name in [
-        "single-quanser-ip02",
-        "double-quanser-dbpen",
-        "triple-glueck-eder-kugi",
-        "single-absolute",
-        "double-absolute",
-        "single-multiarm",
-        "quadruple-paper",
-        "quadruple-robust",
-        "single-stepper",
-        "double-stepper",
-    ] {
-        let found = change(&rig(name), [4, 8], 1.0);
+    let rigs = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../rigs")).unwrap();
+    let names =
+        rigs.filter_map(|file| Some(file.unwrap().file_name().to_str()?.strip_suffix(".toml")?.to_owned()));
+    let found = |name: &str, steps| match rig(name) {
+        rig if rig.actuator.acceleration.is_some() => change_in_all_ticks(&rig, steps),
+        rig => change(&rig, steps, 1.0),
+    };
+    let of_all: Vec<_> = names.map(|name| (found(&name, [4, 8]), name)).collect();
+    assert_eq!(of_all.len(), 14);
+    for (found, name) in of_all {
+        println!("{name}: {found:.1e}");
         assert!(found < 1e-6, "{name}: {found:.1e}");
     }
-    // Negative control: dry friction in two steps.
-    let found = change(&rig("triple-multiarm"), [1, 2], 1.0);
-    assert!(found > 1e-6, "{found:.1e}");
+    // Negative controls: dry friction in one step and two, and pulses.
+    for name in ["triple-multiarm", "quadruple-stepper"] {
+        let found = found(name, [1, 2]);
+        assert!(found > 1e-6, "{name}: {found:.1e}");
+    }
 }
 
 /// More steps than any of these motors needs, so that its own number of steps is tried.

@@ -31,6 +31,16 @@ impl Planted {
         }
     }
 
+    /// With the mean of so many rows in a column.
+    fn averaged(mut self, column: usize, rows: usize) -> Self {
+        let values: Vec<f64> = self.rows.iter().map(|row| row[column]).collect();
+        let means = values.windows(rows).map(|some| some.iter().sum::<f64>() / rows as f64);
+        self.rows.drain(..rows / 2);
+        self.rows.iter_mut().zip(means).for_each(|(row, mean)| row[column] = mean);
+        self.rows.truncate(values.len() + 1 - rows);
+        self
+    }
+
     /// With each row changed.
     fn changed(mut self, change: impl Fn(&mut [f64])) -> Self {
         self.rows.iter_mut().for_each(|row| change(row));
@@ -203,6 +213,7 @@ fn of_rows() -> Vec<Kind> {
             swings(Swing { held_s: [4.0, 6.0], ..Swing::of(1) }),
             &["refused", "touches"],
         ),
+        ("mean over 50 ms", single().averaged(1, 3), &["joint 1 are no whole counts", "smoothed"]),
         ("a stop", swings(Swing { stop: 0.9, ..Swing::of(1) }), &["refused", "touches"]),
     ]
 }
@@ -217,6 +228,7 @@ fn of_drives() -> Vec<Kind> {
         assert!(text.contains(from), "{from}");
         Planted { rig: Rig::from_toml(&text.replace(from, to), name).unwrap(), ..shaken.clone() }
     };
+    let duty = with(|row| row[3] /= 10.0).named("voltage_v", "duty");
     let mut late = shaken.clone();
     let drives: Vec<f64> = late.rows.iter().map(|row| row[3]).collect();
     late.rows.iter_mut().zip(drives.iter().skip(3)).for_each(|(row, drive)| row[3] = *drive);
@@ -231,6 +243,26 @@ fn of_drives() -> Vec<Kind> {
         ("joint in degrees", with(|row| row[2] = row[2].to_degrees()), &["refused", "in degrees"]),
         ("drive three rows early", late, &["written", "3 rows late"]),
         ("drive doubled", with(|row| row[3] *= 2.0), &["all about 2.1 times those of the file", "supply_v"]),
+        (
+            "mean of the joint over 50 ms",
+            shaken.clone().averaged(2, 5),
+            &["joint 1 are no whole counts", "smoothed"],
+        ),
+        (
+            "drive that saturates at 2 V",
+            with(|row| row[3] += (row[3].abs() - 2.0).max(0.0).copysign(row[3])),
+            &["all about 1.9 times those of the file"],
+        ),
+        (
+            "supply doubled",
+            Planted { rig: of_file("supply_v = 10.0", "supply_v = 20.0").rig, ..duty },
+            &["all about 2.1 times those of the file", "supply_v"],
+        ),
+        (
+            "diameter of the pulley for its radius",
+            of_file("pulley_radius_m = 0.00635", "pulley_radius_m = 0.0127"),
+            &["all about 0.5", "the pulley"],
+        ),
         ("rail tilted", shaken_on(0.02), &["rail rises"]),
         (
             "gear ratio halved",

@@ -105,14 +105,14 @@ impl OnChip for Defect {
             Defect::HostWireOpen => vec![at(0, Input::Level(receive, ExternalLevel::Open)), Event::CutLine],
             Defect::LineNoise => {
                 let bauds = [9_600, 57_600, 115_200, 460_800, 500_000, 1_000_000];
-                let mut bytes = |count: usize| (0..count).map(|_| random.random()).collect::<Vec<u8>>();
+                let mut bytes = |count: usize| (0..count).map(|_| random.random::<u8>()).collect::<Vec<_>>();
                 bauds.iter().map(|&baud| Event::Bytes { bytes: bytes(20), baud }).collect()
             }
             Defect::LineFlood => {
                 // Without a pause, for a third of the time after which a silent host is a fault.
                 let ticks = if table.limits.link_ticks > 0 { table.limits.link_ticks / 3 } else { 50 };
                 let bytes = (u64::from(ticks) * tick / (10 * UNITS_PER_SECOND / 460_800)) as usize;
-                let bytes = (0..bytes).map(|i| if i % 7 == 0 { 0 } else { random.random() }).collect();
+                let bytes = (0..bytes).map(|i| if i % 7 == 0 { 0 } else { random.random::<u8>() }).collect();
                 vec![Event::Bytes { bytes, baud: 460_800 }]
             }
             Defect::TableBit => {
