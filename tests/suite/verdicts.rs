@@ -145,6 +145,6 @@ fn a_swing_up_with_too_much_friction_names_the_faults_and_the_smaller_errors_tha
     };
     assert_eq!(arrived, 156);
     let (faults, cure) = help.split_once("; ").unwrap();
-    assert_eq!(faults, "fault tracking error ended 34, fault speed ended 10");
+    assert_eq!(faults, "fault tracking error ended 35, fault speed ended 9");
     assert!(cure.starts_with("200 of 200 arrive with swing_up.mass_spread_percent = 2 and "), "{help}");
 }

@@ -109,15 +109,15 @@ impl Bristle {
         self.moved(deflection, travel, speed).deflection
     }
 
-    /// Whether its force has a kink between two deflections with these speeds (m/s or rad/s): the contact turns round, or
-    /// passes the end of the elastic zone or the beginning of sliding.
+    /// Whether its force has a kink between two deflections with these speeds (m/s or rad/s): the contact passes the end
+    /// of the elastic zone or the beginning of sliding, or turns round outside of the elastic zone.
     #[inline]
     pub fn has_passed_a_kink(&self, deflections: [f64; 2], speeds: [f64; 2]) -> bool {
         let zone = |at: usize| {
             let bent = deflections[at].abs();
             (bent < self.elastic, bent < self.sliding(speeds[at]))
         };
-        speeds[0] * speeds[1] < 0.0 || zone(0) != zone(1)
+        zone(0) != zone(1) || (speeds[0] * speeds[1] < 0.0 && !zone(0).0)
     }
 
     /// z_ss: the deflection while the contact slides at this speed (m or rad).
