@@ -192,6 +192,38 @@ fn faults_turn_the_motor_off_in_the_tick_of_the_firmware() {
     }
 }
 
+/// State of the header after it was asked, while balancing, for a set-point (m).
+fn asked_for(program: &Program, run: &FirmwareRun, setpoint_m: f32) -> u32 {
+    let mut input = run.input[..run.first + 20].to_vec();
+    let last = input.last_mut().unwrap();
+    (last[0], last[1]) = (8, setpoint_m.to_bits());
+    program.replayed(&input).last().unwrap().state
+}
+
+#[test]
+fn a_set_point_is_accepted_up_to_where_the_firmware_accepts_it() {
+    if !is_there("gcc") {
+        return;
+    }
+    const REFUSED: u32 = 99;
+    for name in ["single-quanser-ip02", "quadruple-paper", "single-stepper"] {
+        let (rig, table) = rig_and_table(name);
+        let still = scenario(rig, Law::Lqr, 1000);
+        let run = match rig.actuator.acceleration {
+            Some(_) => steps::recorded_steps(rig, table, &still, steps::nothing),
+            None => recorded(rig, table, &still, None),
+        };
+        assert_eq!(run.fault, None, "{name}");
+        let program = Program::that_replays(&c_header(rig, table).unwrap(), STRICT);
+        let asked = |setpoint_m: f32| asked_for(&program, &run, setpoint_m);
+        let [low, high] = table.limits.setpoints_m();
+        assert_eq!([low, 0.0, high].map(asked), [BALANCING; 3], "{name}");
+        let beyond =
+            [low.next_down(), high.next_up(), table.limits.rail_m[0], table.limits.rail_m[1], f32::NAN];
+        assert_eq!(beyond.map(asked), [REFUSED; 5], "{name}");
+    }
+}
+
 /// A gain of the table, changed by one unit in the last place.
 fn with_another_gain(table: &TableValues) -> TableValues {
     let mut other = table.clone();
