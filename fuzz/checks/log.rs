@@ -1,7 +1,7 @@
 //! Bytes of a log: either a log that is the same after it is written and read again, or an error of one line.
 
 use upright::table::checksum::crc32;
-use upright_design::identify::Log;
+use upright_identify::Log;
 
 /// First bytes of a log.
 const MAGIC: &[u8] = b"UPRTLOG1";

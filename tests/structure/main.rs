@@ -21,11 +21,12 @@ const MOST_COLUMNS_OF_A_COMMENT: usize = 120;
 const GENERATED: &str = "src/gains.rs";
 
 /// The folders of the crates, and what lies in such a folder without belonging to the crate.
-const CRATES: [(&str, &str); 6] = [
+const CRATES: [(&str, &str); 7] = [
     ("src/", "src/image/"),
     ("src/image/", ""),
     ("host-design/board/src/", ""),
     ("host-design/design/src/", ""),
+    ("host-design/identify/src/", ""),
     ("host-design/tool/src/", "host-design/tool/src/bin/"),
     ("host-design/tool/src/bin/upright/", ""),
 ];

@@ -7,8 +7,13 @@ const UNLIMITED: [&str; 6] =
     [".output()", ".wait_with_output()", ".wait()", ".recv()", ".accept()", ".read_line("];
 
 /// The folders of tests and benches that wait for something.
-const FOLDERS: [&str; 4] =
-    ["host-design/tool/tests", "host-design/design/tests", "host-design/board/tests", "tests/suite"];
+const FOLDERS: [&str; 5] = [
+    "host-design/tool/tests",
+    "host-design/design/tests",
+    "host-design/identify/tests",
+    "host-design/board/tests",
+    "tests/suite",
+];
 
 /// Places of such calls in a text, as `name:line`. Asking a program for its version starts nothing that could wait.
 fn unlimited(name: &str, text: &str) -> Vec<String> {

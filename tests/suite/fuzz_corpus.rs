@@ -1,7 +1,7 @@
 //! Inputs that fuzzing found worth keeping, run without the fuzzer: see `.ci/fuzz`.
 
-use upright_design::identify::Log;
 use upright_fuzz_checks::{commands, frame, log, rig};
+use upright_identify::Log;
 
 /// Runs the committed inputs for a target of the fuzzer.
 fn replay(target: &str, mut check: impl FnMut(&[u8])) {

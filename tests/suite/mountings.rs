@@ -8,10 +8,10 @@ use proptest::prelude::*;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::table::Law;
 use upright_design::harness::{Recording, record, with_firmware};
-use upright_design::identify::{shake, shake_with};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, simulate};
 use upright_design::table::{Gains, TableValues};
+use upright_identify::{shake, shake_with};
 
 use crate::published::{certified, rig_of};
 

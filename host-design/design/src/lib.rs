@@ -18,7 +18,6 @@
 //! | [`conversation`] | what a person asks for, telemetry | requests with their answers, in words |
 //! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
 //! | [`defects`] | a kind of defect | changed inputs and outputs of the firmware, and the outcome it must have |
-//! | [`identify`] | logs of a machine under excitation | its parameters, with standard deviations |
 //! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
 //! | [`verify`] | table and requirements | the trust report |
 //! | [`robust`] | rig file and tolerances | weights, poles and noise that survive them |
@@ -34,7 +33,6 @@ pub mod defects;
 pub mod design;
 pub mod export;
 pub mod harness;
-pub mod identify;
 pub mod motion;
 pub mod number;
 pub mod numerics;

@@ -1,5 +1,6 @@
 //! The command line `upright`, as a library: figures, the report, firmware images and where they run, fault campaigns,
-//! the monitor, comparisons and the paper's results. Models, design and simulation are those of `upright-design`.
+//! the monitor, comparisons and the paper's results. Models, design and simulation are those of `upright-design`,
+//! identification that of `upright-identify`.
 //!
 //! | module | what is in it |
 //! |---|---|

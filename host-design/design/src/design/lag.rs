@@ -5,7 +5,7 @@ use crate::numerics::{Matrix, Real};
 use crate::rig::Rig;
 
 /// The time constant (s) that the rig file states; 0 for a force that follows at once.
-pub(crate) fn lag_s(rig: &Rig) -> f64 {
+pub fn lag_s(rig: &Rig) -> f64 {
     rig.actuator.driver_lag_s.unwrap_or(0.0)
 }
 
@@ -67,8 +67,9 @@ pub(crate) fn shares(rig: &Rig, period_s: f64) -> [f64; 2] {
     [2.0 * mean * mean / (mean + mean_square), (mean_square - mean) / (mean_square + mean)]
 }
 
-/// The shares of a force that begins at once and follows with this lag (s).
-pub(crate) fn shares_of_lag(lag_s: f64, period_s: f64) -> [f64; 2] {
+/// The shares of a pending force that begins at once and follows with a lag (s), [in the mean force of a tick, left for
+/// the next tick], with ticks of `period_s`; zeros without a lag.
+pub fn shares_of_lag(lag_s: f64, period_s: f64) -> [f64; 2] {
     match lag_s {
         0.0 => [0.0; 2],
         lag_s => [-libm::expm1(-period_s / lag_s) * lag_s / period_s, libm::exp(-period_s / lag_s)],

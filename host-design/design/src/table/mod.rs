@@ -28,7 +28,6 @@ pub use any_size::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_fi
 pub use error::NoTable;
 pub use source::{gains_source, identity_differences};
 pub use swing_up::{MotionValues, SwingUpValues};
-pub(crate) use values::step_map;
-pub use values::{Gains, LawValues, TableValues};
+pub use values::{Gains, LawValues, TableValues, step_map};
 #[cfg(not(target_family = "wasm"))]
 pub use write::{WriteError, write_atomically};

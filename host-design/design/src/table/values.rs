@@ -312,8 +312,12 @@ fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> 
     })
 }
 
-/// The drive with pulses as the controller sees it.
-pub(crate) fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable> {
+/// The drive with pulses as the controller sees it, with ticks of `period_s`: travel per pulse (m), limits (m/s², m/s),
+/// lag and lead (s).
+///
+/// # Errors
+/// [`NoTable::Range`] if a value is outside the range of single precision.
+pub fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoTable> {
     Ok(StepMap {
         step_m: finite("actuator.step_m", drive.step_m as f32)?,
         acceleration_limit_m_per_s2: finite(

@@ -13,11 +13,11 @@ use super::on_board::OnChip;
 use crate::in_the_loop::{Events, RunError, RunPlace, VirtualBoard};
 use upright_design::defects::{Defect, Expected, Injection, Phase, Trial};
 use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Session, Target, goals, healthy};
-use upright_design::identify::Feed;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Begin;
 use upright_design::table::TableValues;
+use upright_identify::Feed;
 
 /// Settings of a campaign.
 #[derive(Debug, Clone, Copy)]

@@ -8,10 +8,10 @@ use upright::supervision::shaking::ANGLE_RAD;
 use upright::supervision::supervisor::State;
 use upright_design::defects::{Defect, Expected, Injection, Phase, SHAKEN_S};
 use upright_design::harness::{HarnessError, Target};
-use upright_design::identify::{Feed, IdentifyError, Shaken};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
+use upright_identify::{Feed, IdentifyError, Shaken};
 
 use super::attempt::{BEYOND, DefectRun, During};
 use super::observed::Observed;

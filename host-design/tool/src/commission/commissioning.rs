@@ -1,6 +1,6 @@
 //! The steps in their order, and the return to an earlier step after one that was not passed.
 
-use upright_design::identify::{Identification, Log};
+use upright_identify::{Identification, Log};
 
 use super::designing::{Designed, designed, identified, verified};
 use super::guide::Guide;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_design::client::AnyTelemetry;
-use upright_design::identify::{LineError, Log, OverLine};
+use upright_identify::{LineError, Log, OverLine};
 
 use super::guide::Guide;
 use super::machine::Stop;

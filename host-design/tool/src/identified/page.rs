@@ -6,9 +6,9 @@ use super::text::{DIVERGES, notes, row_texts, variance_text, window_rows, window
 use crate::figure::{Axis, COLOURS_CSS, Curve, Figure, Panel, style_sheet};
 use crate::policy;
 use crate::report::{Plot, ReportError};
-use upright_design::identify::{ChannelFit, Identification, Predicted, Settings};
 use upright_design::number::significant;
 use upright_design::numerics::Spectrum;
+use upright_identify::{ChannelFit, Identification, Predicted, Settings};
 
 /// Correlations of at least this size are printed bold.
 const STRONG: f64 = 0.9;
@@ -161,7 +161,7 @@ fn spectra(found: &Identification) -> Option<Figure> {
 
 fn correlations(found: &Identification) -> Vec<CorrelationRow> {
     let size = found.estimates.len();
-    let row = |(index, estimate): (usize, &upright_design::identify::Estimate)| {
+    let row = |(index, estimate): (usize, &upright_identify::Estimate)| {
         let values = found.correlations.iter().skip(index * size).take(index);
         let cell =
             |value: &f64| (format!("{:.2}", (100.0 * value).round() / 100.0 + 0.0), value.abs() >= STRONG);

@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use upright_design::identify::{
+use upright_design::number::significant;
+use upright_identify::{
     ChannelError, ChannelFit, Doubt, Estimate, Identification, ParameterKind, Settings, WindowErrors,
 };
-use upright_design::number::significant;
 
 /// Below this angle the scale of the force is poorly known (rad).
 const LARGE_ENOUGH_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
@@ -361,7 +361,7 @@ fn windows_json(errors: &[WindowErrors]) -> Vec<Value> {
 
 #[cfg(test)]
 mod tests {
-    use upright_design::identify::Refusal;
+    use upright_identify::Refusal;
 
     use super::*;
 

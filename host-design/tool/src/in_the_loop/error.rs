@@ -1,7 +1,7 @@
 //! Why a run of the whole firmware fails.
 
 use upright_design::harness::HarnessError;
-use upright_design::identify::{IdentifyError, ShakeError};
+use upright_identify::{IdentifyError, ShakeError};
 
 use super::qemu::EmulatorError;
 

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use upright_board::Conditions;
 use upright_design::harness::{HarnessError, Recording, Target, record, with_firmware};
-use upright_design::identify::{Log, shake_with};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
+use upright_identify::{Log, shake_with};
 
 use super::board::{Compared, VirtualBoard};
 use super::error::RunError;

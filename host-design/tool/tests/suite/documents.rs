@@ -166,7 +166,10 @@ fn the_map_of_the_architecture_is_that_of_the_repository() {
     for path in named.iter().chain(&named_paths(&how_to_add)).filter(|path| !is_made_later(path)) {
         assert!(root().join(path).exists(), "{path} does not exist");
     }
-    for folder in ["src", "host-design/design/src", "host-design/tool/src"].map(folders).concat() {
+    for folder in ["src", "host-design/design/src", "host-design/identify/src", "host-design/tool/src"]
+        .map(folders)
+        .concat()
+    {
         assert!(named.contains(&folder.as_str()), "ARCHITECTURE.md: {folder} is not on the map");
     }
     let invented = "`src/control/` `src/*.rs` `Board` `src/nowhere/`";

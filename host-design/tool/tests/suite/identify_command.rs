@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use upright_design::identify::{Log, shake};
 use upright_design::rig::{PlantDescription, Rig};
+use upright_identify::{Log, shake};
 
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
 

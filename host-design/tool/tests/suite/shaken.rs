@@ -12,15 +12,15 @@ use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_design::design::design;
 use upright_design::harness::{Harness, HarnessError, Pins, Target, with_firmware};
-use upright_design::identify::{
-    Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakeError, Shaken, checked_and_hanging,
-    identify,
-};
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
+use upright_identify::{
+    Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakeError, Shaken, checked_and_hanging,
+    identify,
+};
 use upright_tool::image::ImageKind;
 use upright_tool::in_the_loop::{PinLink, RunPlace, run_shaken};
 

@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use upright_design::identify::IdentifyError;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
+use upright_identify::IdentifyError;
 use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, Planted, Simulated,
     measured_zeros,

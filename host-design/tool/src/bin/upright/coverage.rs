@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use upright_design::identify::{Coverage, Drawn, TrueFriction, coverage};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
+use upright_identify::{Coverage, Drawn, TrueFriction, coverage};
 
 use crate::failure::Failure;
 use crate::output::print;

@@ -7,11 +7,11 @@ use std::process::ExitCode;
 
 use upright_design::design::DesignError;
 use upright_design::harness::HarnessError;
-use upright_design::identify::{CoverageError, IdentifyError};
 use upright_design::rig::RigError;
 use upright_design::robust::RobustError;
 use upright_design::swing_up::SwingUpError;
 use upright_design::table::NoTable;
+use upright_identify::{CoverageError, IdentifyError};
 use upright_tool::campaign::CampaignError;
 use upright_tool::commission::Stop;
 use upright_tool::image::BuildError;

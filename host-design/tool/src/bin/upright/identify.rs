@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright_design::identify::{Identification, Log, Recordings, Settings, identify_recordings, rig_file};
 use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
+use upright_identify::{Identification, Log, Recordings, Settings, identify_recordings, rig_file};
 use upright_tool::identified::{json, page, text};
 
 use crate::failure::Failure;

@@ -1,7 +1,7 @@
 //! Options that say how a table of measurements is to be read.
 
 use clap::{Args, ValueEnum};
-use upright_design::identify::{AngleReference, AngleZero, Reading};
+use upright_identify::{AngleReference, AngleZero, Reading};
 
 use crate::variation::positive;
 

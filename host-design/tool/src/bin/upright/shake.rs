@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use upright_design::identify::{LineError, Log, OverLine, shake};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
+use upright_identify::{LineError, Log, OverLine, shake};
 use upright_tool::in_the_loop::PinLink;
 use upright_tool::in_the_loop::run_shaken;
 use upright_tool::monitor::{SerialLine, now};
