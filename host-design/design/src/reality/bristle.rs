@@ -109,8 +109,8 @@ impl Bristle {
         self.moved(deflection, travel, speed).deflection
     }
 
-    /// Whether its force has a kink between two deflections with these speeds (m/s or rad/s): the contact passes the end
-    /// of the elastic zone or the beginning of sliding, or turns round outside of the elastic zone.
+    /// Whether its force has a kink between two deflections with these speeds (m/s or rad/s): the contact passes the
+    /// end of the elastic zone or the beginning of sliding, or turns round outside of the elastic zone.
     #[inline]
     pub fn has_passed_a_kink(&self, deflections: [f64; 2], speeds: [f64; 2]) -> bool {
         let zone = |at: usize| {

@@ -155,8 +155,8 @@ fn change(rig: &Rig, [steps, more]: [usize; 2], duration_s: f64) -> f64 {
     (0..rig.states()).map(of_state).fold(0.0, f64::max)
 }
 
-/// The same for a drive that takes pulses, as the sum of what changes in each tick of the same second. The loop does not
-/// act on a difference below a pulse, so that of two runs even one of rounding would grow as that of falling links.
+/// The same for a drive that takes pulses, as the sum of what changes in each tick of the same second. The loop does
+/// not act on a difference below a pulse: between two runs, even one of rounding would grow as links fall.
 fn change_in_all_ticks(rig: &Rig, [steps, more]: [usize; 2]) -> f64 {
     let step_m = rig.actuator.acceleration.as_ref().unwrap().step_m;
     let scenario = Scenario { duration_s: 1.0, ..Scenario::acceptance(rig, Law::Lqr, 0.1) };

@@ -106,8 +106,8 @@ fn the_code_of_the_tick_is_read_within_a_quarter_of_a_second_from_any_time_on() 
     }
 }
 
-/// State and fault, if the image reports any, and whether the power stage was ever enabled, after a start and an attempt
-/// to clear the fault.
+/// State and fault, if the image reports any, and whether the power stage was ever enabled, after a start and an
+/// attempt to clear the fault.
 fn started(image: &Image) -> (Option<(State, Option<Fault>)>, bool) {
     let mut run = Powered::with(image, &Conditions::f405(1), RULES);
     run.run(0.06);
