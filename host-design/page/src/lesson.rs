@@ -9,8 +9,7 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, simulate};
 
 use crate::designed::DeskDesign;
-use crate::question::FILE;
-use crate::refusal::PageRefusal;
+use crate::refusal::{FILE, PageRefusal};
 use crate::twin::InPage;
 
 /// An exercise as its author writes it; texts are for the student.

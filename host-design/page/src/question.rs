@@ -11,11 +11,8 @@ use upright_design::table::gains_source;
 use crate::designed::{DeskDesign, ShownRun};
 use crate::fingerprint::{Fingerprint, PullRounding};
 use crate::lesson::Exercise;
-use crate::refusal::{PageRefusal, failed};
+use crate::refusal::{FILE, PageRefusal, failed};
 use crate::sketch;
-
-/// Name under which errors speak of the rig file; a page shows them without it.
-pub(crate) const FILE: &str = "rig.toml";
 
 /// A question about a rig: the text of its file, and what is wanted.
 #[derive(Debug, Deserialize)]

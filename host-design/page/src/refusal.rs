@@ -12,6 +12,9 @@ use upright_design::verify::VerifyError;
 
 use crate::fingerprint::FingerprintError;
 
+/// Name under which errors speak of the rig file; a page shows them without it.
+pub(crate) const FILE: &str = "rig.toml";
+
 /// Why there is no answer.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PageRefusal {

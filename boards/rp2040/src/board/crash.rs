@@ -8,6 +8,8 @@ use hal::pac::WATCHDOG;
 use upright::flash_image::WordSums;
 use upright::protocol::message::{CrashRecord, Reset, Start};
 
+use super::stop::stop;
+
 /// Mark of a crash that caused the last reset, and of an older one.
 const NEW: u32 = 0x5afe_2040;
 const OLD: u32 = 0x5afe_2041;
@@ -62,11 +64,11 @@ fn record(pc: u32, lr: u32) {
 #[panic_handler]
 fn panicked(_: &PanicInfo) -> ! {
     record(0, 0);
-    super::stop()
+    stop()
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     record(frame.pc(), frame.lr());
-    super::stop()
+    stop()
 }

@@ -4,8 +4,7 @@ use hal::pac::pio0::RegisterBlock;
 use hal::pac::{PIO0, PIO1};
 use upright::gains::SENSORS;
 
-use super::GIVES_PULSES;
-use super::pins::ENCODERS;
+use super::pins::{ENCODERS, GIVES_PULSES};
 use super::state_machine::{Course, load, run, start};
 
 const _: () = assert!(SENSORS <= ENCODERS.len(), "the board counts fewer encoders than the rig has");

@@ -5,8 +5,6 @@
 
 #[cfg(not(rp2350))]
 mod arithmetic;
-#[cfg_attr(not(rp2350), path = "rp2040.rs")]
-#[cfg_attr(rp2350, path = "rp2350.rs")]
 mod chip;
 #[cfg(not(rp2350))]
 mod copying;
@@ -17,6 +15,7 @@ mod motor;
 mod pins;
 mod state_machine;
 mod steps;
+mod stop;
 mod supply;
 mod usb;
 
@@ -28,22 +27,21 @@ use hal::pac::{Interrupt, Peripherals};
 use hal::watchdog::Watchdog;
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
-use upright::gains::{SENSORS, TABLE};
+use upright::gains::SENSORS;
 use upright::protocol::message::Start;
 
 use crate::CYCLES_PER_TICK;
 pub(crate) use chip::CLOCK_HZ;
 use encoders::Encoders;
 use motor::Motor;
+use pins::GIVES_PULSES;
 use steps::Steps;
+use stop::stop;
 use supply::Supply;
 pub(crate) use usb::{UsbLine as SerialLine, UsbMemory};
 
 /// Shortest and longest tick (µs): a shorter one leaves no time for a controller, and SysTick has 24 bits.
 pub(crate) const TICK_US: [u32; 2] = [500, 100_000];
-
-/// Whether the drive of the gain table takes pulses.
-const GIVES_PULSES: bool = TABLE.steps.is_some();
 
 /// Crystal of both boards (Hz).
 const CRYSTAL_HZ: u32 = 12_000_000;
@@ -195,15 +193,5 @@ pub(crate) fn wait_for_interrupt() {
         NVIC::unmask(Interrupt::USBCTRL_IRQ);
         cortex_m::asm::wfi();
         cortex_m::interrupt::enable();
-    }
-}
-
-/// Turns the motor off for good. If the watchdog is running, it resets the microcontroller.
-fn stop() -> ! {
-    cortex_m::interrupt::disable();
-    motor::off();
-    pins::set_status_led(false);
-    loop {
-        cortex_m::asm::nop();
     }
 }

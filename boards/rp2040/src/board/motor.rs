@@ -3,7 +3,7 @@
 use hal::pac::PWM;
 use upright::board::Output;
 
-use super::CLOCK_HZ;
+use super::chip::CLOCK_HZ;
 use super::guard::{self, Guard};
 use super::pins;
 use super::steps::Steps;

@@ -1,9 +1,12 @@
 //! Pins: numbers, pulls and functions. docs/pico.md shows the wiring.
 
 use hal::pac::{IO_BANK0, PADS_BANK0, RESETS, SIO};
+use upright::gains::TABLE;
 
-use super::GIVES_PULSES;
 use super::chip::BLOCKS;
+
+/// Whether the drive of the gain table takes pulses.
+pub(super) const GIVES_PULSES: bool = TABLE.steps.is_some();
 
 /// Phase B of each encoder, from the cart's on; phase A is the next pin.
 pub(super) const ENCODERS: [usize; 5] = [0, 2, 4, 6, 8];

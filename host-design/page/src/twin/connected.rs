@@ -14,8 +14,7 @@ use super::console::Console;
 use super::greeting::greeting;
 use super::request::PageRequest;
 use crate::designed::DeskDesign;
-use crate::question::FILE;
-use crate::refusal::PageRefusal;
+use crate::refusal::{FILE, PageRefusal};
 
 /// Number of the only viewer: a browser opens a port for one page.
 const VIEWER: u64 = 1;

@@ -17,8 +17,7 @@ use super::property::Properties;
 use super::request::{MachineRequest, PageRequest};
 use super::simulated::{SimulatedMachine, World};
 use crate::designed::DeskDesign;
-use crate::question::FILE;
-use crate::refusal::{PageRefusal, failed};
+use crate::refusal::{FILE, PageRefusal, failed};
 
 /// Time between two telemetry messages (s).
 pub const TELEMETRY_S: f32 = 0.005;
@@ -53,11 +52,11 @@ struct Twin {
     machine: SimulatedMachine<'static>,
     epoch: Duration,
     console: Console,
-    world: Power,
+    world: TwinPower,
 }
 
 /// Whether the machine runs.
-enum Power {
+enum TwinPower {
     On(Box<World<'static, 'static>>),
     /// The firmware has stopped, and why; properties for the next power-up.
     Stopped(String, Box<Properties>),
@@ -117,7 +116,7 @@ impl Twin {
         let epoch = Duration::try_from_secs_f64(since_1970_s).unwrap_or_default();
         let world = powered(machine, Properties::of(machine.rig), upright, epoch)?;
         let console = Console::new(Monitor::with_telemetry_every(TELEMETRY_S, &machine.rig.name));
-        Ok(Self { machine, epoch, console, world: Power::On(world) })
+        Ok(Self { machine, epoch, console, world: TwinPower::On(world) })
     }
 
     fn hello(&self) -> Value {
@@ -134,7 +133,7 @@ impl Twin {
         };
         let Self { console, world, .. } = self;
         let ran = match world {
-            Power::On(world) => {
+            TwinPower::On(world) => {
                 asked.into_iter().try_for_each(|request| heard(request, world, console)).and_then(|()| {
                     console.watch(is_silent, world.now());
                     world.run(passed_s, console, &mut goes_on)?;
@@ -142,7 +141,7 @@ impl Twin {
                 })
             }
             // Nothing else can be done while the firmware is stopped.
-            Power::Stopped(..) => Ok(asked.iter().find_map(|request| match request {
+            TwinPower::Stopped(..) => Ok(asked.iter().find_map(|request| match request {
                 PageRequest::Machine { what: MachineRequest::Restart { upright } } => Some(*upright),
                 _ => None,
             })),
@@ -157,8 +156,8 @@ impl Twin {
 
     fn shown(&mut self) -> Value {
         let machine = match &self.world {
-            Power::On(world) => world.picture(),
-            Power::Stopped(why, _) => json!({ "stopped": why }),
+            TwinPower::On(world) => world.picture(),
+            TwinPower::Stopped(why, _) => json!({ "stopped": why }),
         };
         let picture = self.console.picture(&machine, Some(VIEWER));
         let csv = self.console.recorded().map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
@@ -167,23 +166,23 @@ impl Twin {
 
     fn properties(&self) -> Properties {
         match &self.world {
-            Power::On(world) => world.properties().clone(),
-            Power::Stopped(_, properties) => Properties::clone(properties),
+            TwinPower::On(world) => world.properties().clone(),
+            TwinPower::Stopped(_, properties) => Properties::clone(properties),
         }
     }
 
     fn stop(&mut self, error: &HarnessError) {
         self.console.monitor.note(format!("{error}; switch the power off and on"));
-        self.world = Power::Stopped(error.to_string(), Box::new(self.properties()));
+        self.world = TwinPower::Stopped(error.to_string(), Box::new(self.properties()));
     }
 
     fn switch_off_and_on(&mut self, upright: bool) {
-        if let Power::On(world) = &self.world {
+        if let TwinPower::On(world) = &self.world {
             self.epoch = world.now();
         }
         match powered(self.machine, self.properties(), upright, self.epoch) {
             Ok(world) => {
-                self.world = Power::On(world);
+                self.world = TwinPower::On(world);
                 let monitor = Monitor::with_telemetry_every(TELEMETRY_S, &self.machine.rig.name);
                 self.console.begin_again(monitor);
             }

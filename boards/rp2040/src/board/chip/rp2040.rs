@@ -1,15 +1,15 @@
 //! What the RP2040 has otherwise than the RP2350.
 
-pub(super) use hal::pac::{USBCTRL_DPRAM as UsbMemory, USBCTRL_REGS as UsbRegisters};
+pub(in crate::board) use hal::pac::{USBCTRL_DPRAM as UsbMemory, USBCTRL_REGS as UsbRegisters};
 
 /// Processor clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 125_000_000;
 
 /// Bits of the blocks that this image uses, in RESETS (2.14.3): converter, pins, pads, both PIO, PWM.
-pub(super) const BLOCKS: u32 = 1 << 0 | 1 << 5 | 1 << 8 | 1 << 10 | 1 << 11 | 1 << 14;
+pub(in crate::board) const BLOCKS: u32 = 1 << 0 | 1 << 5 | 1 << 8 | 1 << 10 | 1 << 11 | 1 << 14;
 
 /// Name on the bus.
-pub(super) const PRODUCT: &str = "Upright on a Pico";
+pub(in crate::board) const PRODUCT: &str = "Upright on a Pico";
 
 /// The second stage of the boot loader: it makes the flash readable.
 #[unsafe(link_section = ".boot2")]

@@ -1,16 +1,16 @@
 //! What the RP2350 has otherwise than the RP2040. Sections are those of its own datasheet.
 
 use hal::block::ImageDef;
-pub(super) use hal::pac::{USB as UsbRegisters, USB_DPRAM as UsbMemory};
+pub(in crate::board) use hal::pac::{USB as UsbRegisters, USB_DPRAM as UsbMemory};
 
 /// Processor clock (Hz).
 pub(crate) const CLOCK_HZ: u32 = 150_000_000;
 
 /// Bits of the blocks that this image uses, in RESETS (7.5.3): converter, pins, pads, both PIO, PWM.
-pub(super) const BLOCKS: u32 = 1 << 0 | 1 << 6 | 1 << 9 | 1 << 11 | 1 << 12 | 1 << 16;
+pub(in crate::board) const BLOCKS: u32 = 1 << 0 | 1 << 6 | 1 << 9 | 1 << 11 | 1 << 12 | 1 << 16;
 
 /// Name on the bus.
-pub(super) const PRODUCT: &str = "Upright on a Pico 2";
+pub(in crate::board) const PRODUCT: &str = "Upright on a Pico 2";
 
 /// Tells the boot ROM that this is a program for its Arm cores (5.9).
 #[unsafe(link_section = ".start_block")]
