@@ -122,6 +122,8 @@ fn what_is_missing_is_named_in_one_line() {
         let output = upright_alone(&["firmware", command]);
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(4), "{said}");
-        assert!(said.contains(missing) && said.lines().count() == 1, "{said}");
+        // On a busy machine, progress is reported before.
+        let lines: Vec<&str> = said.lines().filter(|line| !line.contains(" s so far")).collect();
+        assert!(lines.len() == 1 && lines[0].contains(missing), "{said}");
     }
 }
