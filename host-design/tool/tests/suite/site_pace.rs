@@ -10,8 +10,8 @@ use upright_page::Desk;
 use crate::site_bits::in_node_with_time;
 use crate::site_page::{begin_with, opened, root};
 
-/// Most processor time of the module for gains, certificates and closed loop (s), and as a multiple of the time that the
-/// library itself takes, where that is more. How long a person waits is printed: a busy machine has no time of its own.
+/// Most processor time of the module for gains, certificates and closed loop (s), and as a multiple of the time that
+/// the library itself takes, where that is more. How long a person waits is printed: it depends on the load.
 const MOST: (f64, f64) = (1.0, 4.0);
 
 /// Moves a weight four times. For each: time to the gains with their certificate and the closed loop, from there to the
