@@ -20,9 +20,8 @@ const MOST_COLUMNS_OF_A_COMMENT: usize = 120;
 /// The tool has written it.
 const GENERATED: &str = "src/gains.rs";
 
-/// The folders of the crates, and what lies in such a folder without belonging to the crate. Images come last: they are
-/// never compiled together.
-const CRATES: [(&str, &str); 12] = [
+/// The folders of the crates, and what lies in such a folder without belonging to the crate.
+const CRATES: [(&str, &str); 8] = [
     ("src/", "src/image/"),
     ("host-design/board/src/", ""),
     ("host-design/design/src/", ""),
@@ -31,14 +30,10 @@ const CRATES: [(&str, &str); 12] = [
     ("host-design/tool/src/", "host-design/tool/src/bin/"),
     ("host-design/tool/src/bin/upright/", ""),
     ("src/image/", ""),
-    ("boards/c-library/src/", ""),
-    ("boards/replay/src/", ""),
-    ("boards/rp2040/src/", ""),
-    ("boards/stm32g4/src/", ""),
 ];
-
-/// Names of types are compared up to this one.
-const FIRST_IMAGE: usize = 7;
+/// Images of other boards, each of which is a program of its own: a type may have the name of another one's.
+const OTHER_IMAGES: [&str; 4] =
+    ["boards/c-library/src/", "boards/replay/src/", "boards/rp2040/src/", "boards/stm32g4/src/"];
 
 struct File {
     /// The lines of comments that are too long, from 1.
@@ -115,10 +110,10 @@ fn findings(root: &Path) -> BTreeSet<String> {
     add_files(root, "", &mut files);
     let mut found = too_long(&files);
     let mut types: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-    for (index, (folder, without)) in CRATES.into_iter().enumerate() {
+    for (folder, without) in CRATES.into_iter().chain(OTHER_IMAGES.map(|folder| (folder, ""))) {
         let files = sources(&files, folder, without);
         found.extend(circles(&files).iter().map(|circle| format!("{folder}: circle of {circle}")));
-        if index > FIRST_IMAGE {
+        if OTHER_IMAGES.contains(&folder) {
             continue;
         }
         for (file, source) in files {
