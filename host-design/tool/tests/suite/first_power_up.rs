@@ -1,4 +1,4 @@
-//! "First power-up" and "First balance" of docs/power-up.md, followed step by step: the flashed image on the virtual
+//! "First power-up" and "First balance" of docs/commission.md, followed step by step: the flashed image on the virtual
 //! board, with the keys and the screen of the monitor.
 
 use std::time::Duration;
