@@ -29,7 +29,7 @@
 //! 5. Verdict: the last 10 s (of a short log, a quarter) are held out of the fit, and predicted in windows of 0.5 s
 //!    with the new rig file, which is read again for that.
 //!
-//! `docs/identify.md` describes the experiment, `docs/identified.md` what can be identified and how to read the answer.
+//! `docs/identify.md` describes the experiment, what can be identified, and how to read the answer.
 
 #![forbid(unsafe_code)]
 
