@@ -21,14 +21,17 @@ const MOST_COLUMNS_OF_A_COMMENT: usize = 120;
 const GENERATED: &str = "src/gains.rs";
 
 /// The folders of the crates, and what lies in such a folder without belonging to the crate.
-const CRATES: [(&str, &str); 8] = [
+const CRATES: [(&str, &str); 11] = [
     ("src/", "src/image/"),
     ("host-design/board/src/", ""),
+    ("host-design/closed-loop/src/", ""),
     ("host-design/design/src/", ""),
     ("host-design/identify/src/", ""),
     ("host-design/page/src/", ""),
+    ("host-design/plan/src/", ""),
     ("host-design/tool/src/", "host-design/tool/src/bin/"),
     ("host-design/tool/src/bin/upright/", ""),
+    ("host-design/trust/src/", ""),
     ("src/image/", ""),
 ];
 /// Images of other boards, each of which is a program of its own: a type may have the name of another one's.

@@ -5,9 +5,9 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::table::Law;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Bench, Sample, Scenario, Sensing, simulate};
+use upright_design::simulate::{Bench, Disturbance, Sample, Scenario, Sensing, simulate};
 use upright_design::table::TableValues;
-use upright_design::verify::{CornerSettings, Corners, Disturbance, coarser, corners, endurance};
+use upright_trust::verify::{CornerSettings, Corners, coarser, corners, endurance};
 
 /// Force noise of 0.1 N rms on the cart, none at the joints.
 const FORCE_NOISE: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 0.0 };

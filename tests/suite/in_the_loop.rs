@@ -13,11 +13,11 @@ use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright::table::checksum::crc32;
-use upright_design::harness::{Pins, Recording, Session, Target};
+use upright_closed_loop::harness::{Pins, Recording, Session, Target};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
-use upright_design::swing_up::{Route, StoredTransitions, hangs, up_and_down, with_motions};
 use upright_design::table::TableValues;
+use upright_plan::{Route, StoredTransitions, hangs, up_and_down, with_motions};
 use upright_tool::image::ImageKind;
 use upright_tool::in_the_loop::{PinLink, RunError, RunPlace, run};
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::table::Law;
-use upright_design::harness::{Recording, record, with_firmware};
+use upright_closed_loop::harness::{Recording, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, simulate};
 use upright_design::table::{Gains, TableValues};

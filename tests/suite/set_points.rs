@@ -5,12 +5,12 @@ use upright::control::controller::Rejected;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::table::Law;
-use upright_design::harness::{Harness, record, with_firmware};
+use upright_closed_loop::harness::{Harness, record, with_firmware};
 use upright_design::parallel;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::table::TableValues;
-use upright_design::verify::at_rest_disturbed;
+use upright_trust::verify::at_rest_disturbed;
 
 use crate::published::{rig as rig_of_file, rig_and_table};
 

@@ -2,12 +2,12 @@
 
 use crate::published::{rig, rig_and_table, rig_path};
 use upright::table::Law;
-use upright_design::harness::{record, with_firmware};
+use upright_closed_loop::harness::{record, with_firmware};
 use upright_design::parallel;
 use upright_design::rig::{PerJoint, Rig};
-use upright_design::swing_up::{Stored, SwingUpError, judge};
 use upright_design::table::TableValues;
-use upright_design::verify::{
+use upright_plan::{Stored, SwingUpError, judge};
+use upright_trust::verify::{
     IMPERFECTIONS, Imperfection, ImperfectionSettings, Survival, at_rest_disturbed, moving, survival,
 };
 

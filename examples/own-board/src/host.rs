@@ -6,7 +6,7 @@ use std::path::Path;
 use own_board::gains::{SWING_UP, TABLE};
 use upright::table::Law;
 use upright_design::design::design;
-use upright_design::harness::{record, with_table};
+use upright_closed_loop::harness::{record, with_table};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};

@@ -14,25 +14,14 @@
 //! | [`table`] | gains and limits | the gain table of the firmware, as values and as Rust source |
 //! | [`export`] | gain table | the controller as a C header |
 //! | [`simulate`] | table and scenario | a run of the firmware's controller against the nonlinear plant |
-//! | [`client`] | bytes of a serial line | commands with their answers, telemetry, logs |
-//! | [`conversation`] | what a person asks for, telemetry | requests with their answers, in words |
-//! | [`harness`] | a target and a scenario | a run of the whole firmware, from power-up on |
-//! | [`defects`] | a kind of defect | changed inputs and outputs of the firmware, and the outcome it must have |
-//! | [`swing_up`] | rig file | motions from hanging to upright and back, with their gains |
-//! | [`verify`] | table and requirements | the trust report |
-//! | [`robust`] | rig file and tolerances | weights, poles and noise that survive them |
 //! | [`study`] | a function of a run's number | outcomes of all runs, computed here or split over several machines |
 //!
 //! The control law itself is not here: a simulation runs the firmware's own controller from the crate `upright`.
 
 #![forbid(unsafe_code)]
 
-pub mod client;
-pub mod conversation;
-pub mod defects;
 pub mod design;
 pub mod export;
-pub mod harness;
 pub mod motion;
 pub mod number;
 pub mod numerics;
@@ -40,9 +29,6 @@ pub mod parallel;
 pub mod plant;
 pub mod reality;
 pub mod rig;
-pub mod robust;
 pub mod simulate;
 pub mod study;
-pub mod swing_up;
 pub mod table;
-pub mod verify;

@@ -90,7 +90,7 @@ pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> 
 
 /// Runs `others` for 0 to `count` - 1 in a thread each, while `own` runs in this one. Where no thread can be started,
 /// as in a browser, they run one after the other.
-pub(crate) fn beside<A: Send, B>(
+pub fn beside<A: Send, B>(
     count: u64,
     others: &(dyn Fn(u64) -> A + Sync),
     own: impl FnOnce() -> B,

@@ -9,8 +9,8 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright_design::client::{Client, ExpectedRig, Mismatch, PATIENCE, Received};
-use upright_design::harness::HarnessError;
+use upright_closed_loop::client::{Client, ExpectedRig, Mismatch, PATIENCE, Received};
+use upright_closed_loop::harness::HarnessError;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 

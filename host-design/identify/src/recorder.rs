@@ -1,6 +1,6 @@
 //! Assembles the log of a firmware that sends every tick.
 
-use upright_design::client::AnyTickLog;
+use upright_closed_loop::client::AnyTickLog;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 

@@ -6,7 +6,7 @@ use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::{Harness, HarnessError, Pins, Target};
+use upright_closed_loop::harness::{Harness, HarnessError, Pins, Target};
 use upright_design::reality::hanging_by_hand;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;

@@ -6,8 +6,8 @@ use upright::table::Law;
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Scenario, Summary, Trace, simulate};
-use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, NoTable, TableValues};
+use upright_plan::{Stored, motions, with_motions};
 
 use crate::refusal::PageRefusal;
 use crate::trust::ShortTrust;

@@ -6,7 +6,7 @@ use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
-use upright_design::harness::{Harness, HarnessError, with_firmware};
+use upright_closed_loop::harness::{Harness, HarnessError, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing, SimulationError};
 use upright_design::table::{TableValues, gains_source};

@@ -1,14 +1,14 @@
 //! Why a question has no answer.
 
 use serde_json::{Value, json};
+use upright_closed_loop::harness::HarnessError;
 use upright_design::design::DesignError;
 use upright_design::export::NoHeader;
-use upright_design::harness::HarnessError;
 use upright_design::rig::RigError;
 use upright_design::simulate::SimulationError;
-use upright_design::swing_up::SwingUpError;
 use upright_design::table::NoTable;
-use upright_design::verify::VerifyError;
+use upright_plan::SwingUpError;
+use upright_trust::verify::VerifyError;
 
 use crate::fingerprint::FingerprintError;
 

@@ -5,7 +5,7 @@ use upright_design::design::Certified;
 use upright_design::number::significant;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_design::verify::{
+use upright_trust::verify::{
     AttractionSettings, Imperfection, ImperfectionSettings, LawTrust, VerifyError, attraction, brief,
     of_size, pushes, rows,
 };

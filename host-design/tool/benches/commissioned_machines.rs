@@ -7,13 +7,12 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use upright::table::Law;
+use upright_closed_loop::harness::{record, with_firmware};
 use upright_design::design::design;
-use upright_design::harness::{record, with_firmware};
 use upright_design::reality::real_chain;
 use upright_design::rig::{PerJoint, PlantDescription, Rig};
-use upright_design::simulate::Scenario;
+use upright_design::simulate::{Disturbance, Scenario};
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::Disturbance;
 use upright_tool::commission::{CommissionPlan, CommissionRecord, Commissioning, Journal, Simulated};
 
 use upright_test_support::published::rig_path;

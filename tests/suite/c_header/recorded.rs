@@ -5,7 +5,7 @@ use upright::control::actuator::Drive;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::{HarnessError, Pace, Pins, Recording, Target, record, with_firmware};
+use upright_closed_loop::harness::{HarnessError, Pace, Pins, Recording, Target, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;

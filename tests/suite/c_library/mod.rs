@@ -11,7 +11,7 @@ use crate::published::rig_and_table;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::Pins;
+use upright_closed_loop::harness::Pins;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;

@@ -9,11 +9,11 @@ use upright::protocol::message::Request;
 use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsOut};
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::{Harness, HarnessError, Pace, Pins, Target, record, with_firmware};
+use upright_closed_loop::harness::{Harness, HarnessError, Pace, Pins, Target, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::{hangs, up_and_down};
 use upright_design::table::TableValues;
+use upright_plan::{hangs, up_and_down};
 
 /// A recorded run.
 pub(super) struct Replay {

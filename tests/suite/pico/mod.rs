@@ -16,9 +16,9 @@ use upright::board::Output;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::Pins;
+use upright_closed_loop::harness::Pins;
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::up_and_down;
+use upright_plan::up_and_down;
 use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, PicoBoard, build_pico};
 
 /// Stack of the image (bytes), as `boards/rp2040/image.x` has it.

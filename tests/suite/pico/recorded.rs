@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use upright::board::Output;
 use upright::supervision::supervisor::State;
-use upright_design::client::{AnyTelemetry, Client, Received};
-use upright_design::harness::{HarnessError, Pace, Pins, Target, healthy, record, with_firmware};
+use upright_closed_loop::client::{AnyTelemetry, Client, Received};
+use upright_closed_loop::harness::{HarnessError, Pace, Pins, Target, healthy, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;

@@ -6,7 +6,7 @@ use super::recorded::{Recorded, recorded};
 use super::{assert_equal, by_hand, no_defect};
 use crate::published::rig_and_table;
 use upright::supervision::supervisor::State;
-use upright_design::harness::Pins;
+use upright_closed_loop::harness::Pins;
 use upright_design::simulate::Scenario;
 use upright_tool::image::PICO_BALANCING_CYCLES;
 

@@ -7,8 +7,8 @@ use std::sync::{Mutex, OnceLock};
 use upright_design::design::{Certified, design};
 use upright_design::motion::RaiseAndLower;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Stored, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
+use upright_plan::{Stored, motions, with_motions};
 
 /// Path of the rig file `name`.
 pub fn rig_path(name: &str) -> PathBuf {

@@ -38,14 +38,16 @@ impl Certified {
 /// A design at one precision, rounded like a certified one but not certified: for ranking designs and for trials.
 /// Those for trials have no gains for continuous time.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Uncertified {
-    pub(crate) double: Design<f64>,
-    pub(crate) single: Design<f32>,
+pub struct Uncertified {
+    /// Rounded to f64.
+    pub double: Design<f64>,
+    /// Rounded to f32, as in the table.
+    pub single: Design<f32>,
 }
 
 impl Uncertified {
     /// The gains for the tick, at the first of the precisions that [`design`] compares.
-    pub(crate) fn sampled_alone(rig: &Rig) -> Result<Self, DesignError> {
+    pub fn sampled_alone(rig: &Rig) -> Result<Self, DesignError> {
         with_precision(FIRST_BITS, || {
             let plant = continuous_plant::<Wide>(rig)?;
             Ok(Self::rounded(&Design::sampled_alone(rig, plant, &mut Vec::new())?))
@@ -57,7 +59,7 @@ impl Uncertified {
     }
 
     /// This design with `law` taken from `other`, a design for the same plant.
-    pub(crate) fn with_law_of(mut self, law: Law, other: &Self) -> Self {
+    pub fn with_law_of(mut self, law: Law, other: &Self) -> Self {
         self.double.sampled.exchange(law, &other.double.sampled);
         self.single.sampled.exchange(law, &other.single.sampled);
         self

@@ -7,7 +7,7 @@ use crate::rig::Rig;
 
 /// How the plant's input acts during a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Hold {
+pub enum Hold {
     /// It is constant.
     Constant,
     /// An acceleration a: the drive moves the cart at the mean speed that a gives it, since even pulses are a constant
@@ -21,7 +21,7 @@ pub(crate) enum Hold {
 
 impl Hold {
     /// That of the rig's drive.
-    pub(crate) fn of(rig: &Rig) -> Self {
+    pub fn of(rig: &Rig) -> Self {
         match &rig.actuator.acceleration {
             None => Self::Constant,
             Some(drive) if drive.bandwidth_hz.is_none() => Self::MeanSpeed,
@@ -30,7 +30,7 @@ impl Hold {
     }
 
     /// Ad and Bd of `x⁺ = Ad x + Bd u` for `ẋ = a x + b u` and ticks of `t` (s).
-    pub(crate) fn sampled<R: Real>(self, a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<R>, Matrix<R>) {
+    pub fn sampled<R: Real>(self, a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<R>, Matrix<R>) {
         let (ad, held) = zero_order_hold(a, b, t);
         let bd = match self {
             Self::Constant => held,

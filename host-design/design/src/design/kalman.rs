@@ -109,7 +109,7 @@ fn stationary_covariance<R: Real>(mut f: Matrix<R>, w: Matrix<R>) -> Matrix<R> {
 /// The drive moves the cart by whole steps, and the links swing with what is rounded: column `inputs` 0, the cart's
 /// acceleration, moves each angle by its entry times the cart's distance. `measured` are the states that the sensors
 /// measure, that of the cart first, and `r` is the covariance of their rounding errors, to which it is added.
-pub(crate) fn add_rounded_motion<R: Real>(r: &mut Matrix<R>, inputs: &Matrix<R>, measured: &[usize]) {
+pub fn add_rounded_motion<R: Real>(r: &mut Matrix<R>, inputs: &Matrix<R>, measured: &[usize]) {
     let of_cart = r[(0, 0)].clone();
     let per_metre = |sensor: usize| inputs[(measured[sensor] + 1, 0)].clone();
     for i in 1..measured.len() {

@@ -21,7 +21,7 @@ pub(super) fn is_late_and_lags(rig: &Rig) -> bool {
 
 /// `ẋ = a x + b u` with the force f behind its command as a further, last state, `τ ḟ = u - f`; the plant itself if
 /// `lag_s` (s) is 0.
-pub(crate) fn with_lag<R: Real>(a: &Matrix<R>, b: &Matrix<R>, lag_s: f64) -> (Matrix<R>, Matrix<R>) {
+pub fn with_lag<R: Real>(a: &Matrix<R>, b: &Matrix<R>, lag_s: f64) -> (Matrix<R>, Matrix<R>) {
     if lag_s == 0.0 {
         return (a.clone(), b.clone());
     }
@@ -55,7 +55,7 @@ pub(super) fn force_last<R: Real>(k: &Matrix<R>) -> Matrix<R> {
 ///
 /// A force with a lag that begins a tick later would need two pending forces. One that has the same mean delay and the
 /// same mean square of it is exact to the second order of `s`: its first share is a little above 1.
-pub(crate) fn shares(rig: &Rig, period_s: f64) -> [f64; 2] {
+pub fn shares(rig: &Rig, period_s: f64) -> [f64; 2] {
     let lag_s = lag_s(rig);
     let [acts, stays] = shares_of_lag(lag_s, period_s);
     if !is_late_and_lags(rig) {

@@ -10,12 +10,12 @@ use upright::table::{Law, PerLaw};
 
 impl<R: Real> Design<R> {
     /// The plant from command to state for continuous time, with the force as its last state if it follows with a lag.
-    pub(crate) fn driven(&self) -> (Matrix<R>, Matrix<R>) {
+    pub fn driven(&self) -> (Matrix<R>, Matrix<R>) {
         with_lag(&self.a, &self.b, self.lag_s)
     }
 
     /// The same for ticks of `period` (s).
-    pub(crate) fn driven_sampled(&self, period: &R) -> (Matrix<R>, Matrix<R>) {
+    pub fn driven_sampled(&self, period: &R) -> (Matrix<R>, Matrix<R>) {
         if self.lag_s == 0.0 {
             return (self.ad.clone(), self.bd.clone());
         }

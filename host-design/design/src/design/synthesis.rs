@@ -111,7 +111,7 @@ impl<R: Real> Design<R> {
 
     /// Only what the table needs, the gains for the tick, for a linear plant that may differ from the rig's. Records
     /// the relative residual of each Riccati equation under the name of its gain.
-    pub(crate) fn sampled_alone(
+    pub fn sampled_alone(
         rig: &Rig,
         plant: LinearModel<R>,
         residuals: &mut Vec<(String, f64)>,
@@ -240,13 +240,13 @@ impl Design<Wide> {
 }
 
 /// Name of the observer's gain among the residuals.
-pub(crate) const OBSERVER: &str = "Kalman filter";
+pub const OBSERVER: &str = "Kalman filter";
 
 /// The columns through which the noise of `[kalman]` enters, one per intensity.
 ///
 /// # Errors
 /// [`DesignError::MassMatrix`] if the plant has no linear model.
-pub(crate) fn noise_columns(rig: &Rig) -> Result<Matrix<f64>, DesignError> {
+pub fn noise_columns(rig: &Rig) -> Result<Matrix<f64>, DesignError> {
     let LinearModel { b, torque_inputs, .. } = continuous_plant::<Wide>(rig)?;
     Ok(noise_inputs(rig, &b, &torque_inputs).rounded(Wide::round_to_f64))
 }
@@ -386,10 +386,7 @@ fn all_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R
 }
 
 /// The continuous-time poles that the rig file asks for (1/s).
-pub(crate) fn wanted_poles<R: Real>(
-    placement: &PolePlacement,
-    rig: &Rig,
-) -> Result<Vec<Pole<R>>, DesignError> {
+pub fn wanted_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R>>, DesignError> {
     let poles = match placement {
         PolePlacement::Response { overshoot_percent, settling_time_s, far_poles } => {
             let mut poles = vec![Pole::Pair(dominant_pair(*overshoot_percent, *settling_time_s))];

@@ -14,7 +14,7 @@
 mod planned;
 mod transition;
 
-pub(crate) use transition::rest;
+pub use transition::rest;
 
 pub use planned::{MotionError, PlannedMotion, RaiseAndLower};
 pub use transition::{Transition, equilibrium_named, posture_name};

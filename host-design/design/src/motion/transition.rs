@@ -77,7 +77,7 @@ impl Transition {
     }
 
     /// Whether all links hang at its beginning.
-    pub(crate) fn begins_hanging(self) -> bool {
+    pub fn begins_hanging(self) -> bool {
         match self {
             Self::Up => true,
             Self::Down => false,
@@ -86,7 +86,7 @@ impl Transition {
     }
 
     /// Whether all links hang at its end.
-    pub(crate) fn ends_hanging(self) -> bool {
+    pub fn ends_hanging(self) -> bool {
         match self {
             Self::Up => false,
             Self::Down => true,
@@ -96,7 +96,7 @@ impl Transition {
 
     /// States of rest at the start and the end of the motion. A link that the motion changes turns the other way round
     /// if `reversed` says so.
-    pub(crate) fn ends(self, states: usize, reversed: impl Fn(usize) -> bool) -> [Vec<f64>; 2] {
+    pub fn ends(self, states: usize, reversed: impl Fn(usize) -> bool) -> [Vec<f64>; 2] {
         let links = states / 2 - 1;
         let (from, to) = (self.from(links), self.to(links));
         let [start, mut end] = [from, to].map(|at| rest(at, states));
@@ -113,7 +113,7 @@ impl Transition {
     }
 
     /// The ends of a motion whose last state is near `last`, with the same whole turns.
-    pub(crate) fn ends_near(self, last: &[f64]) -> [Vec<f64>; 2] {
+    pub fn ends_near(self, last: &[f64]) -> [Vec<f64>; 2] {
         let [start, mut end] = self.ends(last.len(), |_| false);
         if let Self::Between { .. } = self {
             for (end, last) in end.iter_mut().zip(last).skip(2).step_by(2) {
@@ -125,7 +125,7 @@ impl Transition {
 }
 
 /// The state at rest with the cart at 0, its angles within half a turn.
-pub(crate) fn rest(at: Equilibrium, states: usize) -> Vec<f64> {
+pub fn rest(at: Equilibrium, states: usize) -> Vec<f64> {
     let mut state = vec![0.0; states];
     for (joint, angle) in state.iter_mut().skip(2).step_by(2).enumerate() {
         *angle = f64::from(at.half_turns(joint)) * PI;

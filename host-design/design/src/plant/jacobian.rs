@@ -24,8 +24,7 @@ pub struct Partials<const N: usize> {
 
 impl<const N: usize> Partials<N> {
     /// All zero.
-    pub(crate) const ZERO: Self =
-        Self { xdot: 0.0, phi: [0.0; N], phidot: [0.0; N], force: 0.0, torques: [0.0; N] };
+    pub const ZERO: Self = Self { xdot: 0.0, phi: [0.0; N], phidot: [0.0; N], force: 0.0, torques: [0.0; N] };
 
     #[inline]
     fn add(&mut self, factor: f64, other: &Self) {

@@ -30,5 +30,5 @@ pub use machine::{RealChain, ideal_chain, real_plant};
 pub use parameters::real_chain;
 pub use step_motor::StepMotor;
 pub use timing::Timing;
-pub(crate) use tolerated::first_mass;
+pub use tolerated::first_mass;
 pub use tolerated::{corner_machine, corners_of, drawn_machine, tolerated_machine};

@@ -62,6 +62,6 @@ pub fn corners_of(rig: &Rig) -> u64 {
 }
 
 /// The first part whose mass matters (0: cart): a drive that imposes the cart's acceleration does not feel its mass.
-pub(crate) fn first_mass(rig: &Rig) -> usize {
+pub fn first_mass(rig: &Rig) -> usize {
     usize::from(rig.actuator.input() == CartInput::Acceleration)
 }

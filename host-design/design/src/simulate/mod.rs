@@ -19,6 +19,7 @@
 mod any_controller;
 mod bench;
 mod closed_loop;
+mod disturbance;
 mod error;
 mod hand_push;
 mod lockstep;
@@ -31,10 +32,11 @@ mod trace;
 
 pub use bench::{Bench, StepDefect};
 pub use closed_loop::{run, simulate, ticks};
+pub use disturbance::Disturbance;
 pub use error::SimulationError;
 pub use hand_push::HandPush;
 pub use lockstep::{Job, run_all};
-pub(crate) use motion::{Extremes, follow};
+pub use motion::{Extremes, follow};
 pub use scenario::{Begin, Goal, Scenario, Sensing};
 pub use summary::{Fall, FallKind, Summary};
 pub use trace::{Sample, Trace};

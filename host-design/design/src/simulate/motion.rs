@@ -13,24 +13,24 @@ use crate::table::{SwingUpValues, TableValues, WithSize, with_firmware_size};
 
 /// Extreme values that a run reaches during its motions, by the controller's own estimate.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Extremes {
+pub struct Extremes {
     /// Largest innovation of each sensor (m or rad).
-    pub(crate) innovation: Vec<f64>,
+    pub innovation: Vec<f64>,
     /// Largest predicted motion of each sensor while its counter stands still (m or rad): [`Detection::moved`].
-    pub(crate) moved: Vec<f64>,
+    pub moved: Vec<f64>,
     /// Largest distance of the cart from its planned position (m).
-    pub(crate) deviation_m: f64,
+    pub deviation_m: f64,
     /// Largest distance of a link from its planned angle from the vertical (rad).
-    pub(crate) deviation_rad: f64,
+    pub deviation_rad: f64,
     /// Largest speed of the cart (m/s).
-    pub(crate) speed_m_per_s: f64,
+    pub speed_m_per_s: f64,
     /// Lowest and highest position of the cart (m).
-    pub(crate) travel_m: [f64; 2],
+    pub travel_m: [f64; 2],
 }
 
 impl Extremes {
     /// The extremes before the first tick.
-    pub(crate) fn none(sensors: usize) -> Self {
+    pub fn none(sensors: usize) -> Self {
         Self {
             innovation: vec![0.0; sensors],
             moved: vec![0.0; sensors],
@@ -42,7 +42,7 @@ impl Extremes {
     }
 
     /// Extends these extremes by those of another run.
-    pub(crate) fn include(&mut self, other: &Self) {
+    pub fn include(&mut self, other: &Self) {
         raise_to(&mut self.innovation, &other.innovation);
         raise_to(&mut self.moved, &other.moved);
         self.deviation_m = self.deviation_m.max(other.deviation_m);
@@ -77,7 +77,7 @@ fn raise_to(largest: &mut [f64], values: &[f64]) {
 ///
 /// # Errors
 /// [`SimulationError`] if the plant cannot be built or the firmware refuses the table.
-pub(crate) fn follow(
+pub fn follow(
     rig: &Rig,
     table: &TableValues,
     scenario: &Scenario,

@@ -168,6 +168,6 @@ pub fn about(command: &str, rig: &Rig, options: &Value) -> Value {
 }
 
 /// Reads a number that may be infinite: JSON has no infinite numbers, so they are written as null.
-pub(crate) fn infinite_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+pub fn infinite_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }

@@ -73,7 +73,7 @@ pub fn with_firmware_size<A: WithSize>(states: usize, sensors: usize, action: A)
 pub(super) type WidestTable = GainTable<MAX_STATES, MAX_SENSORS>;
 
 /// `matrix`, padded with zeros to R×C.
-pub(crate) fn widest<T: Scalar, const R: usize, const C: usize>(matrix: &Matrix<T>) -> SMatrix<T, R, C> {
+pub fn widest<T: Scalar, const R: usize, const C: usize>(matrix: &Matrix<T>) -> SMatrix<T, R, C> {
     SMatrix::from_fn(|row, column| {
         if row < matrix.rows() && column < matrix.cols() { matrix[(row, column)] } else { T::default() }
     })

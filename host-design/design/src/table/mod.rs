@@ -23,7 +23,7 @@ mod values;
 #[cfg(not(target_family = "wasm"))]
 mod write;
 
-pub(crate) use any_size::widest;
+pub use any_size::widest;
 pub use any_size::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
 pub use error::NoTable;
 pub use source::{gains_source, identity_differences};

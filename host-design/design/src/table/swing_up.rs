@@ -90,7 +90,7 @@ impl SwingUpValues {
     ///
     /// # Errors
     /// As for [`of`](Self::of).
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         table: &WidestTable,
         transition: Transition,

@@ -75,7 +75,7 @@ impl TableValues {
     }
 
     /// The table of an uncertified design, with the gains for the tick: for trials.
-    pub(crate) fn of_uncertified(rig: &Rig, design: &Uncertified) -> Result<Self, NoTable> {
+    pub fn of_uncertified(rig: &Rig, design: &Uncertified) -> Result<Self, NoTable> {
         Self::of_rounded(rig, &design.single, &design.double, Gains::Sampled)
     }
 

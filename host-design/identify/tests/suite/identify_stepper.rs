@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use upright_closed_loop::harness::with_firmware;
 use upright_design::design::design;
-use upright_design::harness::with_firmware;
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
 use upright_design::rig::Rig;

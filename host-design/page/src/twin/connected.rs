@@ -6,8 +6,8 @@ use std::time::Duration;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use upright::supervision::supervisor::State;
-use upright_design::client::ExpectedRig;
-use upright_design::conversation::Monitor;
+use upright_closed_loop::client::ExpectedRig;
+use upright_closed_loop::conversation::Monitor;
 use upright_design::rig::Rig;
 
 use super::console::Console;

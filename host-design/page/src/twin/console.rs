@@ -5,9 +5,9 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
-use upright_design::client::AnyTelemetry;
-use upright_design::conversation::record::{TelemetryCsv, json as telemetry_json};
-use upright_design::conversation::{Monitor, MonitorAction, request as command, words};
+use upright_closed_loop::client::AnyTelemetry;
+use upright_closed_loop::conversation::record::{TelemetryCsv, json as telemetry_json};
+use upright_closed_loop::conversation::{Monitor, MonitorAction, request as command, words};
 
 /// Longest recording (bytes).
 const MAX_RECORDING: usize = 256 << 20;

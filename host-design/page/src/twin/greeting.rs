@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use upright::supervision::supervisor::State;
-use upright_design::conversation::words;
-use upright_design::defects::{Defect, Expected, Needs, Ticks};
+use upright_closed_loop::conversation::words;
+use upright_closed_loop::defects::{Defect, Expected, Needs, Ticks};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 

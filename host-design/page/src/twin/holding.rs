@@ -2,7 +2,7 @@
 
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
-use upright_design::harness::{HeldRig, Status};
+use upright_closed_loop::harness::{HeldRig, Status};
 use upright_design::rig::Rig;
 
 use super::request::Holding;

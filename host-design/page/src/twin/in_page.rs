@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use upright::table::Law;
-use upright_design::conversation::Monitor;
-use upright_design::harness::{HarnessError, endless_firmware};
+use upright_closed_loop::conversation::Monitor;
+use upright_closed_loop::harness::{HarnessError, endless_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use upright_design::rig::Rig;
-use upright_design::verify::Disturbance;
+use upright_design::simulate::Disturbance;
 
 /// A property that can be changed while the rig runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -6,12 +6,11 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright_design::defects::{Defect, Defective, Trial, push_limit_n};
-use upright_design::harness::{Harness, HarnessError, Pins, RailEnds, Target};
+use upright_closed_loop::defects::{Defect, Defective, Trial, push_limit_n};
+use upright_closed_loop::harness::{Harness, HarnessError, Pins, RailEnds, Target};
 use upright_design::rig::{PlantDescription, Rig};
-use upright_design::simulate::{Bench, Scenario, StepDefect};
+use upright_design::simulate::{Bench, Disturbance, Scenario, StepDefect};
 use upright_design::table::TableValues;
-use upright_design::verify::Disturbance;
 
 use super::challenge::Challenge;
 use super::console::Console;

@@ -5,8 +5,8 @@ use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright_design::defects::{Expected, Injection};
-use upright_design::harness::{Harness, HarnessError, Session};
+use upright_closed_loop::defects::{Expected, Injection};
+use upright_closed_loop::harness::{Harness, HarnessError, Session};
 
 use super::attempt::{DefectRun, spoil};
 use super::observed::Observed;

@@ -10,7 +10,7 @@ use upright::supervision::shaking;
 use super::attempt::{Setup, attempt};
 use super::observed::Observed;
 use crate::in_the_loop::{RunError, RunPlace};
-use upright_design::defects::{Defect, Expected, Phase, Ticks, Trial};
+use upright_closed_loop::defects::{Defect, Expected, Phase, Ticks, Trial};
 use upright_design::table::TableValues;
 
 /// Class of an outcome.

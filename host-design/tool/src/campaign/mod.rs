@@ -23,6 +23,7 @@ mod jogged;
 mod judge;
 mod observed;
 mod on_board;
+mod push;
 mod shaken;
 mod tally;
 
@@ -30,4 +31,4 @@ pub use attempt::{During, Setup};
 pub use judge::{Class, TrialOutcome};
 pub use shaken::feed;
 pub use tally::{Campaign, CampaignError, DefectRow, campaign, kinds, one};
-pub use upright_design::defects::{Defect, Defective, Expected, Needs, Phase, Ticks, Trial};
+pub use upright_closed_loop::defects::{Defect, Defective, Expected, Needs, Phase, Ticks, Trial};

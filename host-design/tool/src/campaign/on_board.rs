@@ -8,7 +8,7 @@ use upright_board::{
     UNITS_PER_SECOND,
 };
 
-use upright_design::defects::{Defect, Trial};
+use upright_closed_loop::defects::{Defect, Trial};
 use upright_design::table::TableValues;
 
 use crate::in_the_loop::Event;

@@ -7,11 +7,12 @@ use upright::supervision::fault::Fault;
 
 use super::attempt::{During, Setup};
 use super::judge::{Class, TrialOutcome, allowed, judge, silence_ticks};
+use super::push::pushed;
 use crate::in_the_loop::{RunError, RunPlace};
-use upright_design::defects::{Defect, Expected, Needs, Trial};
+use upright_closed_loop::defects::{Defect, Expected, Needs, Trial};
 use upright_design::study::{Study, StudyError};
 use upright_design::table::TableValues;
-use upright_design::verify::VerifyError;
+use upright_trust::verify::VerifyError;
 
 /// A trial that could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -115,7 +116,7 @@ pub fn one(
     let trial = Trial::draw(setup.rig, setup.table, kinds, seed, number);
     let trial = match setup.during {
         During::Balancing => {
-            trial.pushed(setup.rig, setup.table).map_err(|source| CampaignError::Push { number, source })?
+            pushed(trial, setup.rig, setup.table).map_err(|source| CampaignError::Push { number, source })?
         }
         During::Jog => trial.in_jog(setup.rig),
         During::Shaking(_) => trial.in_shaking(setup.rig),

@@ -6,7 +6,7 @@ use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright_design::client::AnyTelemetry;
+use upright_closed_loop::client::AnyTelemetry;
 use upright_design::plant::absolute_angles;
 
 use super::guide::Guide;

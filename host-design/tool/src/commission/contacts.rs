@@ -2,7 +2,7 @@
 
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
-use upright_design::client::AnyTelemetry;
+use upright_closed_loop::client::AnyTelemetry;
 
 use super::guide::Guide;
 use super::machine::Stop;

@@ -6,13 +6,13 @@ use upright::table::Law;
 use upright_design::design::{Certified, design};
 use upright_design::number::significant;
 use upright_design::rig::{Rig, RigText, Tolerances};
-use upright_design::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{VerifyError, brief};
 use upright_identify::{
     Estimate, Identification, Log, ParameterKind, Recordings, Settings, identify_recordings, rig_file,
 };
+use upright_trust::robust::{JudgeSettings, RobustError, choose, judge, rewritten, set_tolerances};
+use upright_trust::verify::{VerifyError, brief};
 
 use super::machine::Stop;
 use super::plan::CommissionPlan;

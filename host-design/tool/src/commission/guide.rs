@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
-use upright_design::client::{AnyTelemetry, ExpectedRig};
+use upright_closed_loop::client::{AnyTelemetry, ExpectedRig};
 
 use super::machine::{MachineAtHand, Stop};
 use super::record::Journal;

@@ -5,8 +5,8 @@ use std::time::Duration;
 use upright::protocol::message::Request;
 use upright::supervision::homing::Homing;
 use upright::supervision::slow_drive::HOMING_M_PER_S;
-use upright_design::client::AnyTelemetry;
-use upright_design::conversation::words::OTHER_ZERO;
+use upright_closed_loop::client::AnyTelemetry;
+use upright_closed_loop::conversation::words::OTHER_ZERO;
 
 use super::guide::Guide;
 use super::machine::Stop;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use upright_design::harness::HarnessError;
+use upright_closed_loop::harness::HarnessError;
 use upright_design::simulate::SimulationError;
 use upright_design::table::WriteError;
 

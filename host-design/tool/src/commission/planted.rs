@@ -4,7 +4,7 @@ use core::fmt;
 use core::str::FromStr;
 
 use upright::board::Output;
-use upright_design::harness::Pins;
+use upright_closed_loop::harness::Pins;
 use upright_design::rig::{Link, PerJoint, Rig};
 use upright_design::simulate::{Bench, Scenario, StepDefect};
 use upright_design::table::TableValues;

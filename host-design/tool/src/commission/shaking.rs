@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
-use upright_design::client::AnyTelemetry;
+use upright_closed_loop::client::AnyTelemetry;
 use upright_identify::{LineError, Log, OverLine};
 
 use super::guide::Guide;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use upright::protocol::message::Request;
 use upright::supervision::sign_check::Signs;
-use upright_design::client::AnyTelemetry;
+use upright_closed_loop::client::AnyTelemetry;
 
 use super::guide::Guide;
 use super::machine::Stop;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::table::Law;
-use upright_design::harness::{HeldRig, Pins, RailEnds, Session, Target, healthy};
+use upright_closed_loop::harness::{HeldRig, Pins, RailEnds, Session, Target, healthy};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, SimulationError};
 use upright_design::table::TableValues;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use upright_design::client::AnyTelemetry;
+use upright_closed_loop::client::AnyTelemetry;
 use upright_design::rig::{LinkEncoder, Rig, RigText};
 
 use super::contacts;

@@ -9,7 +9,7 @@ use upright_design::parallel;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{AttractionSettings, Margins, largest_tilts, margins_of};
+use upright_trust::verify::{AttractionSettings, Margins, largest_tilts, margins_of};
 
 /// A rig to compare, and the value of the swept key in it.
 #[derive(Debug, Clone, PartialEq)]

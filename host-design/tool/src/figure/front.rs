@@ -2,7 +2,7 @@
 
 use upright::table::Law;
 use upright_design::rig::CartInput;
-use upright_design::robust::{Front, FrontPoint};
+use upright_trust::robust::{Front, FrontPoint};
 
 use super::{Axis, Curve, Figure, Panel};
 

@@ -2,7 +2,7 @@
 
 use upright_design::motion::Transition;
 use upright_design::rig::CartInput;
-use upright_design::swing_up::{Margin, RandomRuns, SolvedCandidate};
+use upright_plan::{Margin, RandomRuns, SolvedCandidate};
 
 use super::{Axis, Curve, Figure, Panel};
 

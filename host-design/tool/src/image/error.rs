@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use upright_design::conversation::words::joint;
+use upright_closed_loop::conversation::words::joint;
 use upright_design::table::WriteError;
 
 use super::board::BoardName;

@@ -1,6 +1,6 @@
 //! Why a run of the whole firmware fails.
 
-use upright_design::harness::HarnessError;
+use upright_closed_loop::harness::HarnessError;
 use upright_identify::{IdentifyError, ShakeError};
 
 use super::qemu::EmulatorError;

@@ -1,5 +1,5 @@
 //! Where the whole firmware runs in closed loop with the simulated rig: on the host in this process, as an image in
-//! QEMU, or as the image that is flashed, on the virtual board. The loop itself is [`upright_design::harness`].
+//! QEMU, or as the image that is flashed, on the virtual board. The loop itself is [`upright_closed_loop::harness`].
 //!
 //! ```
 //! use upright::table::Law;

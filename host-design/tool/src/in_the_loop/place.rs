@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use upright_board::Conditions;
-use upright_design::harness::{HarnessError, Recording, Target, record, with_firmware};
+use upright_closed_loop::harness::{HarnessError, Recording, Target, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;

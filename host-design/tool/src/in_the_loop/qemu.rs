@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use upright::board::Output;
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsOut};
-use upright_design::harness::{HarnessError, Pins, Target};
+use upright_closed_loop::harness::{HarnessError, Pins, Target};
 
 use answer_limit::{AnswerLimit, LONGEST};
 use channels::{Channels, serial_lines};

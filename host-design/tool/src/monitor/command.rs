@@ -3,7 +3,7 @@
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::protocol::message::Request;
 use upright::table::Equilibrium;
-use upright_design::conversation::MonitorAction;
+use upright_closed_loop::conversation::MonitorAction;
 
 /// Change of the set-point per press of an arrow key (m).
 const SHIFT_M: f32 = 0.01;

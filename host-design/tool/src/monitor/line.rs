@@ -6,8 +6,8 @@ use std::time::{Duration, SystemTime};
 
 use serialport::SerialPort;
 use upright::protocol::BAUD;
-use upright_design::client::AnyTelemetry;
-use upright_design::conversation::Monitor;
+use upright_closed_loop::client::AnyTelemetry;
+use upright_closed_loop::conversation::Monitor;
 
 /// Names of serial ports on this system, for an error message.
 const PORTS: &str = if cfg!(windows) {

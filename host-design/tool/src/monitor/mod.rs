@@ -1,4 +1,4 @@
-//! The [conversation](upright_design::conversation) of a person at the keyboard with a running firmware.
+//! The [conversation](upright_closed_loop::conversation) of a person at the keyboard with a running firmware.
 //!
 //! [`view`] draws it, [`SerialLine`] is a serial device or a TCP connection.
 //!
@@ -17,4 +17,6 @@ pub mod view;
 
 pub use command::action;
 pub use line::{OpenError, SerialLine, now};
-pub use upright_design::conversation::{BadCommand, Ended, Monitor, MonitorAction, record, request, words};
+pub use upright_closed_loop::conversation::{
+    BadCommand, Ended, Monitor, MonitorAction, record, request, words,
+};

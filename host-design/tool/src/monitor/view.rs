@@ -8,8 +8,8 @@ use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright_design::client::AnyTelemetry;
-use upright_design::conversation::{Monitor, words};
+use upright_closed_loop::client::AnyTelemetry;
+use upright_closed_loop::conversation::{Monitor, words};
 
 const KEYS: &str = "h/H home (rail)  g check signs  m/M jog (held)  a arm  u up  n down  1…6 turn a link over  d/space disarm  c clear  ←→ 1 cm  0 zero  l law  r record  q quit";
 const COLOURS: [Color; 6] =

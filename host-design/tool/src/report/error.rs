@@ -3,7 +3,7 @@
 use crate::figure::FigureError;
 use upright_design::design::DesignError;
 use upright_design::simulate::SimulationError;
-use upright_design::verify::VerifyError;
+use upright_trust::verify::VerifyError;
 
 /// Why a report cannot be made.
 #[derive(Debug, thiserror::Error)]

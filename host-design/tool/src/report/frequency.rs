@@ -7,7 +7,7 @@ use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::Certified;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_design::verify::{LinearReport, LoopModel, Margins};
+use upright_trust::verify::{LinearReport, LoopModel, Margins};
 
 /// The loop gain L at one frequency.
 struct Point {

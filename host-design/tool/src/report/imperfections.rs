@@ -2,7 +2,7 @@
 
 use super::ReportSource;
 use crate::figure::{Axis, Curve, Figure, Panel};
-use upright_design::verify::{
+use upright_trust::verify::{
     CornerSettings, Imperfections, LeftOut, Survival, VerifyError, corners, limit_cycle,
 };
 

@@ -15,7 +15,8 @@ use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::policy;
 use upright_design::design::{DesignPoles, Feedback};
 use upright_design::rig::{CartInput, PlantDescription, Rig};
-use upright_design::verify::{Certificate, Disturbance};
+use upright_design::simulate::Disturbance;
+use upright_trust::verify::Certificate;
 
 /// Digits of A and B.
 const DIGITS: usize = 6;

@@ -3,7 +3,7 @@
 use crate::figure::{Axis, Curve, Figure, Panel};
 use upright_design::design::DesignPoles;
 use upright_design::rig::Rig;
-use upright_design::verify::LinearReport;
+use upright_trust::verify::LinearReport;
 
 /// The poles in the z-plane with the unit circle, and in the s-plane.
 pub(super) fn figure(rig: &Rig, designed: &DesignPoles, report: &LinearReport) -> Figure {

@@ -5,7 +5,7 @@ use upright::table::Law;
 use crate::figure::{Axis, Figure, HeatMap, Panel};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_design::verify::{Horizon, Map, MapAxis, VerifyError, attraction_map};
+use upright_trust::verify::{Horizon, Map, MapAxis, VerifyError, attraction_map};
 
 const ANGLE: usize = 2;
 const RATE: usize = 3;

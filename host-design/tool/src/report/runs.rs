@@ -6,10 +6,10 @@ use super::number::number;
 use upright_design::design::DesignPoles;
 use upright_design::number::rounded;
 use upright_design::rig::{CartInput, PlantDescription, Rig};
-use upright_design::simulate::{Scenario, Sensing, SimulationError, Summary, Trace, simulate};
-use upright_design::swing_up::Demonstration;
+use upright_design::simulate::{Disturbance, Scenario, Sensing, SimulationError, Summary, Trace, simulate};
 use upright_design::table::TableValues;
-use upright_design::verify::{Disturbance, TrustReport};
+use upright_plan::Demonstration;
+use upright_trust::verify::TrustReport;
 
 /// The same scenario with each law of the table.
 pub(super) struct Scene {

@@ -3,9 +3,9 @@
 use upright_design::design::Certified;
 use upright_design::motion::Transition;
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Demonstration, Margin};
 use upright_design::table::TableValues;
-use upright_design::verify::{Imperfections, TrustReport};
+use upright_plan::{Demonstration, Margin};
+use upright_trust::verify::{Imperfections, TrustReport};
 
 /// Input of a report.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! The trust report as tables of the page.
 
 use upright_design::rig::Rig;
-use upright_design::verify::{FoundRow, TrustReport, rows};
+use upright_trust::verify::{FoundRow, TrustReport, rows};
 
 /// One quantity with its value for each law.
 pub(super) struct TrustRow {
@@ -20,7 +20,7 @@ pub(super) struct CheckRow {
 }
 
 pub(super) fn check_rows(report: &TrustReport) -> Vec<CheckRow> {
-    let row = |check: &upright_design::verify::Check| CheckRow {
+    let row = |check: &upright_trust::verify::Check| CheckRow {
         holds: check.holds,
         law: check.law.title(),
         requirement: check.requirement,

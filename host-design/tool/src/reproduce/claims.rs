@@ -4,7 +4,7 @@ use upright::table::Law;
 
 use super::markdown::markdown_table;
 use super::{Loop, Robustness};
-use upright_design::verify::Margins;
+use upright_trust::verify::Margins;
 
 /// The last section of the summary.
 pub(super) fn claims(all: &[Robustness]) -> String {

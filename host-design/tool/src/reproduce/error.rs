@@ -8,7 +8,7 @@ use upright_design::plant::reference::ReferenceError;
 use upright_design::rig::RigError;
 use upright_design::simulate::SimulationError;
 use upright_design::table::NoTable;
-use upright_design::verify::VerifyError;
+use upright_trust::verify::VerifyError;
 
 /// Why a result cannot be computed.
 #[derive(Debug, thiserror::Error)]

@@ -14,7 +14,7 @@ use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{LinearReport, Margins, continuous_margins, linear};
+use upright_trust::verify::{LinearReport, Margins, continuous_margins, linear};
 
 /// Time at the start of each run that is left out (s): the initial state no longer matters after it.
 const FORGOTTEN_S: f64 = 10.0;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use upright_design::swing_up::Stored;
+use upright_plan::Stored;
 
 use super::error::SiteError;
 use super::files::toml_files;

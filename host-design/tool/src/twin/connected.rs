@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use upright_design::client::ExpectedRig;
+use upright_closed_loop::client::ExpectedRig;
 
 use super::dispatcher::{Dispatcher, PICTURE};
 use crate::monitor::{SerialLine, now};

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use upright_design::conversation::Monitor;
+use upright_closed_loop::conversation::Monitor;
 use upright_page::twin::{Console, MachineRequest, PageRequest};
 
 use super::connections::{Connections, EventQueue, ViewerEvent, ViewerId};

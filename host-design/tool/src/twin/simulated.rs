@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant, SystemTime};
 
-use upright_design::harness::{HarnessError, Target};
+use upright_closed_loop::harness::{HarnessError, Target};
 use upright_page::twin::{Properties, SimulatedMachine, World};
 
 use super::dispatcher::{Dispatcher, PICTURE};

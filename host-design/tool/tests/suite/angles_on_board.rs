@@ -4,15 +4,15 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::table::Law;
 use upright_board::{Conditions, Image, Input, SensorDefect};
+use upright_closed_loop::harness::{Harness, Recording};
 use upright_design::design::design;
-use upright_design::harness::{Harness, Recording};
 use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::{Stored, hangs, refined, up_and_down, with_motions};
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::at_rest_disturbed;
+use upright_plan::{Stored, hangs, refined, up_and_down, with_motions};
 use upright_tool::image::{BoardName, ImageKind, build_for};
 use upright_tool::in_the_loop::{Event, VirtualBoard, measure, run_compared};
+use upright_trust::verify::at_rest_disturbed;
 
 use crate::equipment::built_for;
 use crate::published::{rig_and_table, rig_and_table_with_motions, rig_path};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use upright_design::harness::with_firmware;
+use upright_closed_loop::harness::with_firmware;
 use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
 use upright_design::table::TableValues;
 use upright_tool::commission::{

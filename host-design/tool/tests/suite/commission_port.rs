@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
+use upright_closed_loop::harness::with_firmware;
 use upright_design::design::design;
-use upright_design::harness::with_firmware;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_test_support::limits::accepted;

@@ -13,7 +13,7 @@ use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
-use upright_design::harness::{Pins, Session};
+use upright_closed_loop::harness::{Pins, Session};
 use upright_design::simulate::{Bench, Scenario};
 use upright_tool::image::{BoardName, ImageKind, flash_checksum};
 use upright_tool::in_the_loop::VirtualBoard;

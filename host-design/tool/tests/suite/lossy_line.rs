@@ -7,7 +7,7 @@ use upright::board::Contacts;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_design::harness::{Pins, with_firmware};
+use upright_closed_loop::harness::{Pins, with_firmware};
 use upright_tool::monitor::{Monitor, MonitorAction};
 
 use crate::published::rig_and_table;

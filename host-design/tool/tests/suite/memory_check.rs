@@ -7,7 +7,7 @@ use upright::protocol::message::{Answer, Reply, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright_board::{Conditions, Image, Input};
-use upright_design::conversation::words;
+use upright_closed_loop::conversation::words;
 use upright_tool::image::{BoardName, ImageKind};
 use upright_tool::in_the_loop::RULES;
 

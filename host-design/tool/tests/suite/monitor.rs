@@ -25,7 +25,7 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
-use upright_design::client::{ExpectedRig, Mismatch};
+use upright_closed_loop::client::{ExpectedRig, Mismatch};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;

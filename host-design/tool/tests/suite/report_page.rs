@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use upright_design::motion::Transition;
-use upright_design::swing_up::Margin;
+use upright_plan::Margin;
 
 use crate::report_rigs::{
     LINEAR, SINGLE, coarse_report, quick_report, report_with_imperfections, report_with_margins,

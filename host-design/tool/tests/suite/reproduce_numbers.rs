@@ -9,8 +9,8 @@ use upright_design::design::{Feedback, design};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
 use upright_design::simulate::FallKind;
-use upright_design::verify::continuous_margins;
 use upright_tool::reproduce::{ContinuousRun, Loop, Loops, PaperRigs, printed, published};
+use upright_trust::verify::continuous_margins;
 
 use crate::reproduced::REPRODUCED;
 

@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use serde_json::json;
 use upright::table::Law;
+use upright_closed_loop::harness::{Harness, with_firmware};
 use upright_design::design::design;
-use upright_design::harness::{Harness, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::{Gains, TableValues};

@@ -11,8 +11,8 @@ use upright::table::Law;
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::linear;
 use upright_test_support::limits::{Lines, PATIENCE, Running};
+use upright_trust::verify::linear;
 
 use crate::report_devtools::Browser;
 

@@ -56,7 +56,7 @@ impl Default for SwingUpRules {
 
 impl SwingUpRules {
     /// Largest input of a plan (N, or m/s²), where given.
-    pub(crate) fn input(&self) -> Option<f64> {
+    pub fn input(&self) -> Option<f64> {
         self.force_n.or(self.acceleration_m_per_s2)
     }
 }

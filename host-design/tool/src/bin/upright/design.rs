@@ -7,8 +7,8 @@ use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
-use upright_design::swing_up::{Stored, SwingUpError};
 use upright_design::table::{Gains, TableValues, gains_source, identity_differences, write_atomically};
+use upright_plan::{Stored, SwingUpError};
 use upright_tool::image::BoardName;
 use upright_tool::project::gain_table;
 

@@ -5,18 +5,18 @@ use std::fmt::{self, Display};
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
+use upright_closed_loop::harness::HarnessError;
 use upright_design::design::DesignError;
-use upright_design::harness::HarnessError;
 use upright_design::rig::RigError;
-use upright_design::robust::RobustError;
-use upright_design::swing_up::SwingUpError;
 use upright_design::table::NoTable;
 use upright_identify::{CoverageError, IdentifyError};
+use upright_plan::SwingUpError;
 use upright_tool::campaign::CampaignError;
 use upright_tool::commission::Stop;
 use upright_tool::image::BuildError;
 use upright_tool::in_the_loop::RunError;
 use upright_tool::site::SiteError;
+use upright_trust::robust::RobustError;
 
 /// Why a command ends without its result, and with which exit status.
 pub(crate) struct Failure {

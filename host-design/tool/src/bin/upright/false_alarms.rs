@@ -4,8 +4,8 @@ use clap::Args;
 use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
-use upright_design::robust::{FalseAlarms, Machines, false_alarms};
 use upright_design::study::Study;
+use upright_trust::robust::{FalseAlarms, Machines, false_alarms};
 
 use crate::failure::Failure;
 use crate::output::print;

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
-use upright_design::swing_up::SwingUpError;
+use upright_plan::SwingUpError;
 use upright_tool::campaign::{Campaign, Defect, DefectRow, During, Setup, campaign, feed, kinds, one};
 use upright_tool::in_the_loop::{PinLink, RunPlace};
 

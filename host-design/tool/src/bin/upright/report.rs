@@ -6,11 +6,11 @@ use clap::Args;
 use serde_json::json;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
-use upright_design::swing_up::{Demonstration, Script, Stored, motions, with_motions};
 use upright_design::table::{TableValues, write_atomically};
-use upright_design::verify::{Effort, trust};
+use upright_plan::{Demonstration, Script, Stored, motions, with_motions};
 use upright_tool::in_the_loop::RunError;
 use upright_tool::report::{REGION_POINTS, Report as Page, ReportSource, report};
+use upright_trust::verify::{Effort, trust};
 
 use super::swing_up::with_margins;
 use super::verify::search;

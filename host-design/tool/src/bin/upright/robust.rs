@@ -6,10 +6,10 @@ use clap::Args;
 use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::{Rig, Tolerances};
-use upright_design::robust::{Choice, JudgeSettings, Judgement, RobustError, choose, judge, rewritten};
 use upright_design::study::Study;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::figure::front_figure;
+use upright_trust::robust::{Choice, JudgeSettings, Judgement, RobustError, choose, judge, rewritten};
 
 use crate::failure::Failure;
 use crate::output::print;

@@ -8,8 +8,8 @@ use serde_json::json;
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing, Summary, Trace, simulate};
-use upright_design::swing_up::{Demonstration, Script};
 use upright_design::table::{TableValues, write_atomically};
+use upright_plan::{Demonstration, Script};
 use upright_tool::figure::run_svg;
 use upright_tool::in_the_loop::RunError;
 

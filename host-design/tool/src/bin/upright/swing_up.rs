@@ -10,11 +10,11 @@ use upright_design::motion::Transition;
 use upright_design::rig::{CartInput, Rig};
 use upright_design::simulate::Trace;
 use upright_design::study::Study;
-use upright_design::swing_up::{
+use upright_design::table::{TableValues, write_atomically};
+use upright_plan::{
     Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, Stored, SwingUpError,
     SwingUpPlan, designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
 };
-use upright_design::table::{TableValues, write_atomically};
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
 use upright_tool::in_the_loop::RunError;
 

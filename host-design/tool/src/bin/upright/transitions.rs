@@ -8,11 +8,11 @@ use serde_json::json;
 use upright_design::motion::{PlannedMotion, RaiseAndLower, Transition};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
-use upright_design::swing_up::{
+use upright_design::table::write_atomically;
+use upright_plan::{
     Route, RouteRuns, Searched, Stored, StoredTransitions, SwingUpError, TransitionRuns, designed_table_with,
     motions, on_route, route_runs,
 };
-use upright_design::table::write_atomically;
 
 use crate::failure::Failure;
 use crate::output::{print, warn_of_an_arm};

@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 use upright::table::Law;
 use upright_design::design::{Certified, design};
 use upright_design::rig::Rig;
-use upright_design::swing_up::{Stored, StoredTransitions, SwingUpError, motions, with_motions};
 use upright_design::table::{Gains, TableValues};
+use upright_plan::{Stored, StoredTransitions, SwingUpError, motions, with_motions};
 
 use crate::failure::Failure;
 use upright_tool::progress::with_spinner;

@@ -9,7 +9,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::simulate;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
-use upright_design::verify::{
+use upright_trust::verify::{
     Effort, Horizon, Imperfection, ImperfectionSettings, Imperfections, MapAxis, TrustReport, attraction_map,
     monte_carlo, sample, spread, trust,
 };
@@ -101,7 +101,7 @@ pub(crate) fn search(rig: &Rig, table: &TableValues) -> Result<Vec<Imperfections
     let laws: Vec<Law> = table.laws.present().map(|(law, _)| law).collect();
     let settings = ImperfectionSettings::of(rig);
     Ok(with_bar("imperfections", (laws.len() * Imperfection::all_of(rig).len()) as u64, |done| {
-        let search = |&law: &Law| upright_design::verify::imperfections(rig, table, law, &settings, done);
+        let search = |&law: &Law| upright_trust::verify::imperfections(rig, table, law, &settings, done);
         laws.iter().map(search).collect::<Result<_, _>>()
     })?)
 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright_design::client::{AnyTelemetry, Client, Received};
-use upright_design::harness::{HarnessError, Pace, Pins, Target};
+use upright_closed_loop::client::{AnyTelemetry, Client, Received};
+use upright_closed_loop::harness::{HarnessError, Pace, Pins, Target};
 
 use super::VirtualBoard;
 

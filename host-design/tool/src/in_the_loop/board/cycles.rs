@@ -3,11 +3,11 @@
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 use upright_board::{Conditions, Image, TickCost, TickPart, Time, UNITS_PER_MICROSECOND};
-use upright_design::harness::{Harness, HarnessError, record};
+use upright_closed_loop::harness::{Harness, HarnessError, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
-use upright_design::swing_up::up_and_down;
 use upright_design::table::TableValues;
+use upright_plan::up_and_down;
 
 use super::VirtualBoard;
 use super::places::places;

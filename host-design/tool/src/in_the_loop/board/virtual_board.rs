@@ -12,7 +12,7 @@ use upright_board::{
     BoardWiring, CodePlace, Conditions, ExternalLevel, Image, Input, Meter, PowerStage, Rules,
     SimulatedBoard, Stopped, TickCost, Time, UNITS_PER_MICROSECOND, UNITS_PER_SECOND, seconds,
 };
-use upright_design::harness::{HarnessError, Pace, Pins, Target};
+use upright_closed_loop::harness::{HarnessError, Pace, Pins, Target};
 use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
 

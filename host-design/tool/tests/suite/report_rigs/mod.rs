@@ -7,10 +7,10 @@ use upright::table::Law;
 use upright_design::design::design;
 use upright_design::motion::Transition;
 use upright_design::rig::Rig;
-use upright_design::swing_up::Margin;
 use upright_design::table::{Gains, TableValues};
-use upright_design::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
+use upright_plan::Margin;
 use upright_tool::report::{REGION_POINTS, Report, ReportSource, report};
+use upright_trust::verify::{ImperfectionSettings, LawTrust, TrustReport, imperfections, linear};
 
 /// A rig from this repository.
 pub(crate) fn rig(name: &str) -> Rig {

@@ -11,10 +11,10 @@ use upright_board::{Conditions, CoreTiming, Image};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_design::verify::at_rest_disturbed;
 use upright_tool::image::{self, BoardName, ImageKind};
 use upright_tool::in_the_loop::{self, Span, TickFigures};
 use upright_tool::project::checkout;
+use upright_trust::verify::at_rest_disturbed;
 
 use super::board::BoardOption;
 use super::built::designed;

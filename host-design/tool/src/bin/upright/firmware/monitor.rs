@@ -15,7 +15,7 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 #[cfg(unix)]
 use signal_hook::consts::SIGHUP;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use upright_design::client::ExpectedRig;
+use upright_closed_loop::client::ExpectedRig;
 use upright_design::rig::Rig;
 use upright_tool::monitor::record::{TelemetryCsv, json};
 use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use upright_board::{Conditions, Image, UNITS_PER_SECOND};
-use upright_design::harness::Recording;
+use upright_closed_loop::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;

@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use upright_design::number::significant;
 use upright_design::rig::{CartInput, PolePlacement, Rig, Tolerances};
-use upright_design::robust::{Choice, Chosen, Front, JudgeSettings, Judgement, LawNumbers, LawRipple};
+use upright_trust::robust::{Choice, Chosen, Front, JudgeSettings, Judgement, LawNumbers, LawRipple};
 
 /// The choice for each law, then the front.
 pub(super) fn chosen(rig: &Rig, tolerances: &Tolerances, choice: &Choice, front: Option<&Front>) -> String {

@@ -2,7 +2,7 @@
 
 use core::fmt::Write;
 
-use upright_design::verify::{Imperfections, Survival};
+use upright_trust::verify::{Imperfections, Survival};
 
 /// The table of one law: the most dangerous imperfection first.
 pub(super) fn table(found: &Imperfections) -> String {

@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use upright_design::number::poles;
 use upright_design::rig::Rig;
-use upright_design::verify::{Check, LawTrust, TrustReport, rows};
+use upright_trust::verify::{Check, LawTrust, TrustReport, rows};
 
 /// The whole report; `arguments` are those of `upright verify` with which the worst random plant is run again.
 pub(super) fn report(rig: &Rig, report: &TrustReport, arguments: &str) -> String {
