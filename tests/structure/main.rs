@@ -21,13 +21,14 @@ const MOST_COLUMNS_OF_A_COMMENT: usize = 120;
 const GENERATED: &str = "src/gains.rs";
 
 /// The folders of the crates, and what lies in such a folder without belonging to the crate.
-const CRATES: [(&str, &str); 11] = [
+const CRATES: [(&str, &str); 12] = [
     ("src/", "src/image/"),
     ("host-design/board/src/", ""),
     ("host-design/closed-loop/src/", ""),
     ("host-design/design/src/", ""),
     ("host-design/identify/src/", ""),
     ("host-design/page/src/", ""),
+    ("host-design/paper/src/", ""),
     ("host-design/plan/src/", ""),
     ("host-design/tool/src/", "host-design/tool/src/bin/"),
     ("host-design/tool/src/bin/upright/", ""),

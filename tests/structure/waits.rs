@@ -7,10 +7,11 @@ const UNLIMITED: [&str; 6] =
     [".output()", ".wait_with_output()", ".wait()", ".recv()", ".accept()", ".read_line("];
 
 /// The folders of tests and benches that wait for something.
-const FOLDERS: [&str; 7] = [
+const FOLDERS: [&str; 8] = [
     "host-design/tool/tests",
     "host-design/design/tests",
     "host-design/identify/tests",
+    "host-design/paper/tests",
     "host-design/plan/tests",
     "host-design/trust/tests",
     "host-design/board/tests",

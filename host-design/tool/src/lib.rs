@@ -13,7 +13,6 @@
 //! | [`commission`] | from a wired rig to a balancing one, step by step |
 //! | [`monitor`] | telemetry and commands in a terminal |
 //! | [`compare`] | rigs and sweeps side by side |
-//! | [`reproduce`] | the paper's results beside ours |
 //! | [`identified`] | results of an identification, as text, JSON, page and rig file |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`site`] | the whole of it in a page, with nothing to install |
@@ -40,11 +39,11 @@ pub mod identified;
 pub mod image;
 pub mod import;
 pub mod in_the_loop;
+pub mod markdown;
 pub mod monitor;
 mod policy;
 pub mod progress;
 pub mod project;
 pub mod report;
-pub mod reproduce;
 pub mod site;
 pub mod twin;

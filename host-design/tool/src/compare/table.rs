@@ -1,7 +1,7 @@
 //! A comparison as text and as CSV.
 
 use super::row::{ComparedRow, Fate, LawFigures, input};
-use crate::reproduce::markdown_table;
+use crate::markdown::markdown_table;
 
 /// All rows as a Markdown table with aligned columns; `key` is the swept key. The column of rigs is left out if all
 /// rows have the same rig.

@@ -1,8 +1,7 @@
-//! `upright compare` and `upright reproduce` as a user or a script sees them.
+//! `upright compare` as a user or a script sees it.
 
 use crate::command::{SINGLE, path_of, status, stderr, stdout, upright};
 use crate::published::rig_path;
-use crate::reproduced::{REPRODUCED, Reproduced};
 use serde_json::Value;
 
 #[test]
@@ -95,35 +94,4 @@ fn bad_input_ends_with_status_2_and_writes_nothing() {
         assert!(parts.iter().all(|part| stderr(&output).contains(part)), "{}", stderr(&output));
         assert!(stdout(&output).is_empty() && std::fs::read_dir(folder.path()).unwrap().count() == 0);
     }
-}
-
-#[test]
-fn the_paper_is_reproduced_from_any_folder() {
-    let Reproduced { output, files, .. } = &*REPRODUCED;
-    assert_eq!(status(output), 0, "{}", stderr(output));
-    assert_eq!(files.len(), 22);
-    assert!(files["summary.md"] == output.stdout, "the summary is what is printed");
-}
-
-#[test]
-fn a_folder_without_the_papers_rig_files_is_an_error_of_the_user() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = upright(&["reproduce", "--no-write", "--rigs", folder.path().to_str().unwrap()]);
-    assert_eq!(status(&output), 2);
-    assert!(stderr(&output).contains("quadruple-paper.toml"), "{}", stderr(&output));
-}
-
-#[test]
-fn a_folder_that_cannot_be_made_is_said_before_anything_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("file");
-    std::fs::write(&file, "precious").unwrap();
-    let output = upright(&["reproduce", "--out", file.join("below").to_str().unwrap()]);
-    assert_eq!(status(&output), 2);
-    assert!(
-        stderr(&output).contains("--out") && stderr(&output).contains("cannot be created"),
-        "{}",
-        stderr(&output)
-    );
-    assert_eq!(std::fs::read_to_string(&file).unwrap(), "precious");
 }

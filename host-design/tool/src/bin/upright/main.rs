@@ -15,7 +15,6 @@ mod import;
 mod output;
 mod reading;
 mod report;
-mod reproduce;
 mod robust;
 mod shake;
 mod simulate;
@@ -47,7 +46,6 @@ Examples:
   upright report rigs/quadruple-paper.toml      all of it on one page, with an animation
   upright site --out site                       a page that designs rigs in the browser, nothing to install
   upright compare rigs/quadruple-paper.toml --sweep tick.period_s=0.0005..0.01
-  upright reproduce                             the results of the paper compared with ours
 
 Exit status:
   0  done
@@ -76,7 +74,6 @@ enum UprightCommand {
     Report(report::ReportCommand),
     Compare(compare::CompareCommand),
     Coverage(coverage::IdentifiedMachinesCommand),
-    Reproduce(reproduce::ReproduceCommand),
     Robust(robust::RobustCommand),
     Shake(shake::ShakeCommand),
     Identify(identify::IdentifyCommand),
@@ -112,7 +109,6 @@ fn main() -> ExitCode {
         UprightCommand::Report(command) => command.run(),
         UprightCommand::Compare(command) => command.run(),
         UprightCommand::Coverage(command) => command.run(),
-        UprightCommand::Reproduce(command) => command.run(),
         UprightCommand::Robust(command) => command.run(),
         UprightCommand::Shake(command) => command.run(),
         UprightCommand::Identify(command) => command.run(),

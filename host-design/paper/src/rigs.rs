@@ -53,7 +53,7 @@ impl PaperDesigns {
 }
 
 /// The chain of a rig that has one.
-pub(super) fn chain(rig: &Rig) -> Result<&Chain, ReproduceError> {
+pub(crate) fn chain(rig: &Rig) -> Result<&Chain, ReproduceError> {
     match &rig.plant {
         PlantDescription::Chain(chain) => Ok(chain),
         PlantDescription::Model(_) => Err(ReproduceError::NotAChain(rig.name.clone())),

@@ -7,20 +7,20 @@ use upright_design::simulate::{Job, Sample, Scenario, run_all, ticks};
 use upright_design::table::TableValues;
 
 /// A run of the firmware's controller.
-pub(super) struct FirmwareRun {
+pub(crate) struct FirmwareRun {
     /// The rig.
-    pub(super) rig: Rig,
+    pub(crate) rig: Rig,
     /// Its table.
-    pub(super) table: TableValues,
+    pub(crate) table: TableValues,
     /// What happens in the run.
-    pub(super) scenario: Scenario,
+    pub(crate) scenario: Scenario,
 }
 
 /// The time histories of these runs, each recorded at its tick.
 ///
 /// # Errors
 /// [`ReproduceError::Simulation`] if a run cannot be made.
-pub(super) fn trajectories(runs: &[FirmwareRun]) -> Result<Vec<Trajectory>, ReproduceError> {
+pub(crate) fn trajectories(runs: &[FirmwareRun]) -> Result<Vec<Trajectory>, ReproduceError> {
     let mut trajectories = Vec::with_capacity(runs.len());
     for FirmwareRun { rig, scenario, .. } in runs {
         trajectories.push(Trajectory::with_room(rig.tick.period_s, ticks(rig, scenario)? + 1));

@@ -9,7 +9,7 @@ use upright_design::design::{Feedback, design};
 use upright_design::plant::reference::Tolerance;
 use upright_design::rig::{Chain, PlantDescription, PolePlacement, Rig};
 use upright_design::simulate::FallKind;
-use upright_tool::reproduce::{ContinuousRun, Loop, Loops, PaperRigs, printed, published};
+use upright_paper::{ContinuousRun, Loop, Loops, PaperRigs, printed, published};
 use upright_trust::verify::continuous_margins;
 
 use crate::reproduced::REPRODUCED;

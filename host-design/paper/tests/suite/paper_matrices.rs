@@ -5,7 +5,7 @@ use upright::table::Equilibrium;
 use upright_design::numerics::Wide;
 use upright_design::plant::{ChainParameters, LinearModel, linearise};
 use upright_design::rig::{Chain, PlantDescription};
-use upright_tool::reproduce::published::{A, B};
+use upright_paper::published::{A, B};
 
 fn paper() -> Chain {
     match rig("quadruple-paper").plant {

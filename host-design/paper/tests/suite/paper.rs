@@ -9,7 +9,7 @@ use crate::published::{designed, rig};
 use upright_design::design::{Certified, Feedback, design};
 use upright_design::numerics::eigenvalues;
 use upright_design::rig::Rig;
-use upright_tool::reproduce::published::{LQR_K, LQR_N, PLACEMENT_K, PLACEMENT_N};
+use upright_paper::published::{LQR_K, LQR_N, PLACEMENT_K, PLACEMENT_N};
 
 fn printed_k(law: &Feedback<f64>) -> String {
     law.k.entries().iter().map(|gain| format!("{gain:.2}")).collect::<Vec<_>>().join(" ")

@@ -7,12 +7,14 @@
 //! simulates; where a tick is involved, the firmware's own controller runs.
 //!
 //! ```
-//! use upright_tool::reproduce::{Agreement, ComparedValue, Digits};
+//! use upright_paper::{Agreement, ComparedValue, Digits};
 //!
 //! let gain = |ours| ComparedValue::printed("K[1]", "A, B", "3.1623", Digits::Decimals(4), ours).verdict;
 //! assert_eq!(gain(3.162_278), Agreement::EveryDigit);
 //! assert_eq!(gain(3.162_4), Agreement::UnitsOfLastDigit(1));
 //! ```
+
+#![forbid(unsafe_code)]
 
 mod claims;
 mod comparison;
@@ -22,7 +24,6 @@ mod errata;
 mod error;
 mod figures;
 mod firmware_loop;
-mod markdown;
 pub mod published;
 mod reproduction;
 mod responses;
@@ -37,7 +38,6 @@ pub use continuous_loop::ContinuousRun;
 pub use designs::{Designs, PoleSet, designs};
 pub use errata::{Erratum, Evidence, errata};
 pub use error::ReproduceError;
-pub use markdown::markdown_table;
 pub use reproduction::{Reproduction, reproduce};
 pub use responses::{Loop, Loops, StepResponse, responses};
 pub use rigs::{PaperDesigns, PaperRigs, SEED};

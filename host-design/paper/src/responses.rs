@@ -52,7 +52,7 @@ pub struct Loops {
 }
 
 /// A law in a kind of loop, and what happens in the run.
-pub(super) type LoopRun = (Law, Loop, ContinuousRun);
+pub(crate) type LoopRun = (Law, Loop, ContinuousRun);
 
 impl Loops {
     /// Designs `rig`.
@@ -65,7 +65,7 @@ impl Loops {
     }
 
     /// With this design of `rig`, a chain.
-    pub(super) fn with(rig: &Rig, certified: Certified) -> Result<Self, ReproduceError> {
+    pub(crate) fn with(rig: &Rig, certified: Certified) -> Result<Self, ReproduceError> {
         if certified.double.continuous.each().into_array().contains(&None) {
             return Err(ReproduceError::OneLaw(rig.name.clone()));
         }
@@ -74,14 +74,14 @@ impl Loops {
     }
 
     /// Continuous gains of `law`.
-    pub(super) fn continuous(&self, law: Law) -> Result<&Feedback<f64>, ReproduceError> {
+    pub(crate) fn continuous(&self, law: Law) -> Result<&Feedback<f64>, ReproduceError> {
         let laws = &self.certified.double.continuous;
         laws.each()[law].ok_or_else(|| ReproduceError::OneLaw(self.rig.name.clone()))
     }
 
     /// Simulates each law in its kind of loop, from rest. Sampled loops are recorded at the tick, whatever the run
     /// says.
-    pub(super) fn trajectories(&self, wanted: &[LoopRun]) -> Result<Vec<Trajectory>, ReproduceError> {
+    pub(crate) fn trajectories(&self, wanted: &[LoopRun]) -> Result<Vec<Trajectory>, ReproduceError> {
         // The runs of the firmware advance together, the others by themselves.
         let (alone, together): (Vec<usize>, Vec<usize>) =
             (0..wanted.len()).partition(|&index| wanted[index].1 == Loop::Continuous);

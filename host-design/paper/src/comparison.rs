@@ -77,7 +77,7 @@ impl ComparedValue {
 }
 
 /// The value of a number printed as text; NaN if the text is not a number.
-pub(super) fn value_of(text: &str) -> f64 {
+pub(crate) fn value_of(text: &str) -> f64 {
     text.parse().unwrap_or(f64::NAN)
 }
 

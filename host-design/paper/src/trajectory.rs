@@ -42,13 +42,13 @@ pub const BAND: f64 = 0.02;
 
 impl Trajectory {
     /// An empty record with room for so many samples, `sample_s` (s) apart.
-    pub(super) fn with_room(sample_s: f64, samples: usize) -> Self {
+    pub(crate) fn with_room(sample_s: f64, samples: usize) -> Self {
         let (states, forces_n) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
         Self { sample_s, states, forces_n, fall: None }
     }
 
     /// Appends a sample.
-    pub(super) fn push(&mut self, state: &[f64], force_n: f64) {
+    pub(crate) fn push(&mut self, state: &[f64], force_n: f64) {
         self.states.push(state.to_vec());
         self.forces_n.push(force_n);
     }
@@ -89,7 +89,7 @@ impl Trajectory {
 
 /// A fall at `at_s`, if a link is beyond the horizontal: names the first one. A state that is not finite is a fall,
 /// too.
-pub(super) fn fall_of(state: &[f64], at_s: f64) -> Option<Fall> {
+pub(crate) fn fall_of(state: &[f64], at_s: f64) -> Option<Fall> {
     if !state.iter().all(|entry| entry.is_finite()) {
         return Some(Fall { at_s, kind: FallKind::NotFinite });
     }

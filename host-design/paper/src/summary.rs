@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use super::claims::claims;
-use super::markdown::markdown_table;
 use super::{
     Agreement, ComparedValue, Designs, Erratum, HORIZON_S, LONGEST_S, PoleSet, Reproduction, Sensitivity,
     Settling, SettlingRow, StepResponse, printed, published,
 };
+use upright_tool::markdown::markdown_table;
 
 const HEAD: &str = "\
 # The paper's results beside ours

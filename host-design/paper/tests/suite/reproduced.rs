@@ -1,4 +1,4 @@
-//! One run of `upright reproduce`, with which several tests compare: it takes many seconds.
+//! One run of `upright-paper`, with which several tests compare: it takes many seconds.
 
 use std::collections::BTreeMap;
 use std::process::{Command, Output};
@@ -7,9 +7,7 @@ use std::sync::LazyLock;
 use serde_json::Value;
 
 use upright_test_support::limits::output;
-
-use crate::documented_tables::between;
-use crate::documents::read;
+use upright_test_support::repository;
 
 /// What the command printed and wrote.
 pub(crate) struct Reproduced {
@@ -24,8 +22,8 @@ pub(crate) struct Reproduced {
 pub(crate) static REPRODUCED: LazyLock<Reproduced> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let output = output(
-        Command::new(env!("CARGO_BIN_EXE_upright"))
-            .args(["reproduce", "--out", "new/folder"])
+        Command::new(env!("CARGO_BIN_EXE_upright-paper"))
+            .args(["--out", "new/folder"])
             .current_dir(folder.path()),
     );
     let entries = std::fs::read_dir(folder.path().join("new/folder")).unwrap();
@@ -42,6 +40,10 @@ impl Reproduced {
     pub(crate) fn text(&self, name: &str) -> &str {
         std::str::from_utf8(&self.files[name]).unwrap()
     }
+}
+
+fn read(file: &str) -> String {
+    std::fs::read_to_string(repository().join(file)).unwrap()
 }
 
 /// The numbers in a text, in their order.
@@ -72,11 +74,12 @@ fn differing(committed: &str, found: &str, least: f64) -> Option<String> {
 #[test]
 fn the_numbers_of_the_committed_summary_come_out() {
     let page = read("docs/results/reproduction.md");
-    let committed = between(&page, "summary").unwrap();
+    let (_, rest) = page.split_once("<!-- summary -->").unwrap();
+    let (committed, _) = rest.split_once("<!-- /summary -->").unwrap();
     assert!(numbers(committed).len() > 500);
     let found = REPRODUCED.text("summary.md");
     let differing = |found: &str| differing(committed, found, 1e-9);
-    assert_eq!(differing(found), None, "docs/results/reproduction.md: run `upright reproduce` again?");
+    assert_eq!(differing(found), None, "docs/results/reproduction.md: run `cargo paper` again?");
     // Another layout is the same; one other digit, or a number more, is not.
     assert_eq!(differing(&found.replace(" |", "\t|").replace("--", "-")), None);
     assert!(differing(&found.replacen("11.0075", "11.0175", 1)).is_some());
@@ -96,4 +99,43 @@ fn the_committed_figures_come_out() {
         assert!(differing(&committed, &format!("{before}points=\"7777,7777 {after}"), 2.0).is_some());
         assert!(differing(&committed, &found.replacen("points=\"", "points=\"9", 1), 2.0).is_some());
     }
+}
+
+fn command(arguments: &[&str]) -> Output {
+    output(Command::new(env!("CARGO_BIN_EXE_upright-paper")).args(arguments))
+}
+
+fn stderr(output: &Output) -> &str {
+    std::str::from_utf8(&output.stderr).unwrap()
+}
+
+#[test]
+fn the_paper_is_reproduced_from_any_folder() {
+    let Reproduced { output, files, .. } = &*REPRODUCED;
+    assert!(output.status.success(), "{}", stderr(output));
+    assert_eq!(files.len(), 22);
+    assert!(files["summary.md"] == output.stdout, "the summary is what is printed");
+}
+
+#[test]
+fn a_folder_without_the_papers_rig_files_is_an_error_of_the_user() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = command(&["--no-write", "--rigs", folder.path().to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("quadruple-paper.toml"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_said_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "precious").unwrap();
+    let output = command(&["--out", file.join("below").to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains("--out") && stderr(&output).contains("cannot be created"),
+        "{}",
+        stderr(&output)
+    );
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "precious");
 }

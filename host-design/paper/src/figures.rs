@@ -1,7 +1,7 @@
 //! The comparison as files: the paper's figures 5 to 8, Table 2 over the length of its runs, spectra; and their data.
 
 use super::{BAND, Loop, Reproduction, Robustness, Settling, StepResponse, Trajectory, printed};
-use crate::figure::{Axis, Curve, Figure, FigureError, Panel};
+use upright_tool::figure::{Axis, Curve, Figure, FigureError, Panel};
 
 impl Reproduction {
     /// Names and contents of all files: `summary.md`, figures as SVG, and for each its data as CSV.

@@ -2,12 +2,12 @@
 
 use upright::table::Law;
 
-use super::markdown::markdown_table;
 use super::{Loop, Robustness};
+use upright_tool::markdown::markdown_table;
 use upright_trust::verify::Margins;
 
 /// The last section of the summary.
-pub(super) fn claims(all: &[Robustness]) -> String {
+pub(crate) fn claims(all: &[Robustness]) -> String {
     let mut text = "## \"Less frequency\" and \"more robust\": what the paper says of the LQR, measured\n\n\
         At rest under the disturbances of figures 7 and 8, the same numbers for every line, 127 s: root mean square and mean\n\
         frequency, weighted by power (Welch: Hann windows of 8.192 s, half overlapping). One run each, so differences of a few\n\

@@ -66,7 +66,7 @@ pub fn designs(
 }
 
 /// Poles of the plant alone [re, im] (1/s), by real part; its two integrators exactly 0.
-pub(super) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError> {
+pub(crate) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError> {
     let a = continuous_plant::<Wide>(rig)?.a;
     let poles = eigenvalues(&a).map_err(|_| upright_design::design::DesignError::Poles)?;
     // A double pole is found with half of the bits.
@@ -74,7 +74,7 @@ pub(super) fn open_loop_poles(rig: &Rig) -> Result<Vec<[f64; 2]>, ReproduceError
     Ok(poles.iter().map(|pole| pole.to_f64().map(clean)).collect())
 }
 
-pub(super) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<ComparedValue> {
+pub(crate) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<ComparedValue> {
     let six = Digits::Significant(6);
     let mut rows = Vec::new();
     for (i, entries) in published::A.iter().enumerate() {
@@ -92,7 +92,7 @@ pub(super) fn plant_rows(a: &Matrix<f64>, b: &Matrix<f64>) -> Vec<ComparedValue>
     rows
 }
 
-pub(super) fn gain_rows(
+pub(crate) fn gain_rows(
     law: &str,
     from: &'static str,
     ours: &Feedback<f64>,

@@ -1,0 +1,83 @@
+//! Compares the results of the paper with ours, and writes its figures 5 to 8 and Table 2 as figures and data.
+
+use std::error::Error;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use upright_design::design::DesignError;
+use upright_design::table::write_atomically;
+use upright_paper::{PaperRigs, ReproduceError, reproduce};
+use upright_tool::progress::with_progress;
+use upright_tool::project::checkout;
+
+/// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures
+/// and data.
+#[derive(Parser)]
+#[command(
+    name = "upright-paper",
+    version,
+    before_help = "\
+Examples:
+  cargo paper                          prints the comparison; figures, data and summary go to reproduced/
+  cargo paper --rigs ../upright/rigs --out paper      from another folder
+  cargo paper --no-write --json | jq '.designs.rows[] | select(.verdict != \"every_digit\")'
+
+Exit status:
+  0  done
+  2  bad input: a rig file, an argument, a file that cannot be written
+  3  a design problem has no solution"
+)]
+struct Arguments {
+    /// Folder of quadruple-paper.toml and quadruple-paper-printed.toml [default: rigs of the checkout]
+    #[arg(long, value_name = "DIR")]
+    rigs: Option<PathBuf>,
+    /// Folder for summary.md, all numbers (numbers.json), and all figures (SVG) and their data (CSV)
+    #[arg(long, value_name = "DIR", default_value = "reproduced")]
+    out: PathBuf,
+    /// Write nothing
+    #[arg(long, conflicts_with = "out")]
+    no_write: bool,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    let Err(error) = run(Arguments::parse()) else { return ExitCode::SUCCESS };
+    eprintln!("upright-paper: {error}");
+    let is_without_solution = matches!(error.downcast_ref(), Some(ReproduceError::Design(_)))
+        || error.downcast_ref::<DesignError>().is_some();
+    ExitCode::from(if is_without_solution { 3 } else { 2 })
+}
+
+fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
+    let folder = arguments.rigs.map_or_else(default_rigs, Ok)?;
+    let rigs = PaperRigs::from_folder(&folder)?;
+    if !arguments.no_write {
+        std::fs::create_dir_all(&arguments.out)
+            .map_err(|error| format!("--out {}: cannot be created: {error}", arguments.out.display()))?;
+    }
+    let found = with_progress(|progress| reproduce(&rigs, progress))?;
+    if !arguments.no_write {
+        let mut files = found.files()?;
+        files.push(("numbers.json".to_owned(), serde_json::to_vec(&found)?));
+        for (name, contents) in &files {
+            write_atomically(&arguments.out.join(name), contents)?;
+        }
+        eprintln!(
+            "wrote summary.md, numbers.json, figures and data ({} files) to {}",
+            files.len(),
+            arguments.out.display()
+        );
+    }
+    let text = if arguments.json { serde_json::to_string(&found)? + "\n" } else { found.summary() };
+    Ok(std::io::stdout().lock().write_all(text.as_bytes())?)
+}
+
+fn default_rigs() -> Result<PathBuf, Box<dyn Error>> {
+    let checkout = checkout()
+        .map_err(|error| format!("{error}; or name the folder of the paper's rig files with --rigs"))?;
+    Ok(checkout.join("rigs"))
+}
