@@ -29,7 +29,7 @@ Exit status:
   2  bad input: a rig file, an argument, a file that cannot be written
   3  a design problem has no solution"
 )]
-struct Arguments {
+struct PaperCommand {
     /// Folder of quadruple-paper.toml and quadruple-paper-printed.toml [default: rigs of the checkout]
     #[arg(long, value_name = "DIR")]
     rigs: Option<PathBuf>,
@@ -45,34 +45,34 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let Err(error) = run(Arguments::parse()) else { return ExitCode::SUCCESS };
+    let Err(error) = run(PaperCommand::parse()) else { return ExitCode::SUCCESS };
     eprintln!("upright-paper: {error}");
     let is_without_solution = matches!(error.downcast_ref(), Some(ReproduceError::Design(_)))
         || error.downcast_ref::<DesignError>().is_some();
     ExitCode::from(if is_without_solution { 3 } else { 2 })
 }
 
-fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
-    let folder = arguments.rigs.map_or_else(default_rigs, Ok)?;
+fn run(command: PaperCommand) -> Result<(), Box<dyn Error>> {
+    let folder = command.rigs.map_or_else(default_rigs, Ok)?;
     let rigs = PaperRigs::from_folder(&folder)?;
-    if !arguments.no_write {
-        std::fs::create_dir_all(&arguments.out)
-            .map_err(|error| format!("--out {}: cannot be created: {error}", arguments.out.display()))?;
+    if !command.no_write {
+        std::fs::create_dir_all(&command.out)
+            .map_err(|error| format!("--out {}: cannot be created: {error}", command.out.display()))?;
     }
     let found = with_progress(|progress| reproduce(&rigs, progress))?;
-    if !arguments.no_write {
+    if !command.no_write {
         let mut files = found.files()?;
         files.push(("numbers.json".to_owned(), serde_json::to_vec(&found)?));
         for (name, contents) in &files {
-            write_atomically(&arguments.out.join(name), contents)?;
+            write_atomically(&command.out.join(name), contents)?;
         }
         eprintln!(
             "wrote summary.md, numbers.json, figures and data ({} files) to {}",
             files.len(),
-            arguments.out.display()
+            command.out.display()
         );
     }
-    let text = if arguments.json { serde_json::to_string(&found)? + "\n" } else { found.summary() };
+    let text = if command.json { serde_json::to_string(&found)? + "\n" } else { found.summary() };
     Ok(std::io::stdout().lock().write_all(text.as_bytes())?)
 }
 
