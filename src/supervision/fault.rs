@@ -157,19 +157,17 @@ impl Fault {
         Entry {
             fault: Fault::Encoder,
             name: "encoder",
-            condition: "three measurements in a row of one encoder contradict the model: it jumps, or, except while balancing \
-                        with a force, is reversed, swapped or late; or three samples fail the check of an absolute \
-                        sensor; single ones are rejected and counted",
+            condition: "three readings in a row of one encoder contradict the model, or fail the check of an \
+                        absolute sensor: it jumps, or is reversed, swapped or late",
             reaction: Reaction::Ticks(3),
-            remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too, and on a stepper the \
-                     drive in any case; home, and check the signs again",
+            remedy: "check plug, wire and coupling of this encoder; if it is the cart's, the motor too; on a \
+                     stepper the drive in any case; home, and check the signs again",
         },
         Entry {
             fault: Fault::Frozen,
             name: "frozen encoder",
-            condition: "an encoder stands still while the model moves it by a seventh of its threshold per tick or more; while \
-                        balancing with a force, also if its wire is open; slower motion is found later, of a noisy \
-                        absolute sensor within 0.2 s",
+            condition: "an encoder stands still although the model moves it; while balancing with a force, also \
+                        one with an open wire",
             reaction: Reaction::Ticks(10),
             remedy: "check plug, wire and coupling of this encoder, and on a stepper the drive; home, and check the signs \
                      again",
@@ -177,12 +175,11 @@ impl Fault {
         Entry {
             fault: Fault::Motor,
             name: "motor",
-            condition: "the rig does not move as the motor's force should move it: motor dead, weak, stuck or reversed, or \
-                        a collision; ticks count from when the missing motion is more than the encoders' steps hide, and \
-                        while balancing with a force, from when it is more than a hand would explain",
+            condition: "the rig does not move as the motor's force should move it: the motor is dead, weak, \
+                        stuck or reversed, or the cart has hit something",
             reaction: Reaction::Ticks(20),
-            remedy: "check motor, coupling and belt, and the masses in the rig file; on a stepper also its driver, current and \
-                     switches of the microsteps; keep hands off the cart",
+            remedy: "check motor, coupling and belt, and the masses in the rig file; on a stepper also its \
+                     driver, current and switches of the microsteps; keep hands off the cart",
         },
         Entry {
             fault: Fault::Saturated,
@@ -208,32 +205,30 @@ impl Fault {
         Entry {
             fault: Fault::Table,
             name: "table",
-            condition: "the gain table no longer fits its checksum; it is read all the time, and before arming",
+            condition: "the gain table no longer fits its checksum",
             reaction: Reaction::Hardware("at most two passes over the table"),
             remedy: "flash the firmware again; if it comes again, the memory is damaged",
         },
         Entry {
             fault: Fault::Watchdog,
             name: "watchdog",
-            condition: "ticks stopped: the independent watchdog resets the microcontroller, which starts disarmed and \
-                        keeps this as the reason",
+            condition: "ticks stopped, so the watchdog has reset the microcontroller",
             reaction: Reaction::Hardware("2 to 6 periods, by the watchdog"),
             remedy: "report it with the firmware's version; home and check the signs again",
         },
         Entry {
             fault: Fault::Crash,
             name: "crash",
-            condition: "panic, processor fault, stack overflow, a changed bit of table or code: the motor is turned \
-                        off, the watchdog resets; the firmware starts disarmed and keeps this as the reason",
+            condition: "panic, processor fault, stack overflow, or a changed bit of table or code; the watchdog \
+                        has reset the microcontroller",
             reaction: Reaction::Hardware("at once, in the handler"),
             remedy: "report it with the firmware's version; home and check the signs again",
         },
         Entry {
             fault: Fault::Clock,
             name: "clock",
-            condition: "crystal or PLL have not started, or the crystal has another frequency than the board's: the \
-                        firmware runs from the internal clock, at another tick, and never arms; or a stepper's pulses \
-                        did not end in time",
+            condition: "the crystal or the PLL has not started, or the crystal has another frequency than the \
+                        board's; or a stepper's pulses did not end in time",
             reaction: Reaction::Ticks(1),
             remedy: "flash the image for this board, or check its crystal; then reset",
         },
@@ -256,16 +251,16 @@ impl Fault {
         Entry {
             fault: Fault::Disturbed,
             name: "disturbed",
-            condition: "three measurements in a row are further from the model than after any push that the rig survives: \
-                        pushed too hard while balancing with a force, or an encoder reversed or swapped, or the motor stuck",
+            condition: "three readings in a row are further from the model than after any push that the rig \
+                        survives: pushed too hard, or an encoder is reversed or swapped, or the motor is stuck",
             reaction: Reaction::Ticks(3),
             remedy: "let the links hang, then raise them again; if nobody pushed, check encoders and motor",
         },
         Entry {
             fault: Fault::Image,
             name: "image",
-            condition: "at the start, the code in flash is not as it was linked: it has been damaged, or the image was not \
-                        made by `upright firmware build`",
+            condition: "at the start, the code in flash is not as it was linked: it is damaged, or `upright \
+                        firmware build` has not made this image",
             reaction: Reaction::Hardware("the motor never comes on"),
             remedy: "flash the firmware again; if it comes again, the memory is damaged",
         },

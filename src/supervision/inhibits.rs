@@ -28,15 +28,15 @@ inhibits! {
     4 TILTED "a link is not upright: hold all of them upright";
     5 MOVING "something moves: hold cart and links still";
     6 OFF_CENTRE "the cart is too close to an end of the rail: push it away";
-    7 LIMIT_SWITCH "a limit switch is pressed, or its wire is open";
-    8 EMERGENCY_STOP "the emergency stop is pressed, or its wire is open";
-    9 DRIVER "the power stage reports a fault";
-    10 SUPPLY "the supply is too low or too high";
+    7 LIMIT_SWITCH "a limit switch is pressed, or its wire is open: push the cart off it";
+    8 EMERGENCY_STOP "the emergency stop is pressed, or its wire is open: release it";
+    9 DRIVER "the power stage reports a fault: see whether its supply is on";
+    10 SUPPLY "the supply is too low or too high: measure it";
     11 HELD "the key was held since the motor went off: let go, then try again";
     12 NO_OBSERVER "the gain table holds no observer: give the rig its encoders and `[kalman]`";
-    13 TABLE "the gain table or the image does not fit its checksum, or the table does not fit this build";
-    14 NOT_HANGING "the links do not hang at rest";
-    15 NO_SWITCHES "this rig has no rail with switches at its ends";
+    13 TABLE "the gain table or the image does not fit its checksum, or the table does not fit this build: flash the firmware again";
+    14 NOT_HANGING "the links do not hang at rest: wait until they do";
+    15 NO_SWITCHES "this rig has no rail with switches at its ends: home with the cart at position 0";
     16 NO_SWING_UP "the gain table holds no swing-up: give the rig file `[swing_up]`";
     17 NOT_BALANCING "the rig does not balance: there is nothing to lower";
     18 UNSETTLED "the cart is on its way to the set-point, or a link leans: wait until it stands";
@@ -45,7 +45,7 @@ inhibits! {
     21 MOTOR "the motor's sign is not checked since power-up: jog the cart";
     22 NOT_SHAKEN "the rig is not being shaken: begin again";
     23 ZEROS "the links swing about different zeros every 5 s: let go of them, hold the cart";
-    24 NO_TRANSITION "the gain table holds no motion from this equilibrium to that one";
+    24 NO_TRANSITION "the gain table holds no motion from this equilibrium to that one: plan it with `upright transitions`";
     25 OTHER_ZERO "a link hangs elsewhere than at its absolute sensor's zero: let it hang, or correct `sensor_zero_counts`";
 }
 

@@ -48,17 +48,15 @@ fn rows(table: &str) -> Vec<Vec<&str>> {
 }
 
 fn faults() -> String {
-    let mut table = String::from(
-        "| code | fault | condition | ticks to motor off | what to do |\n|---|---|---|---|---|\n",
-    );
+    let mut table = String::from("| fault | what it means | what to do | ticks |\n|---|---|---|---|\n");
     for entry in Fault::ALL {
         table += &format!(
-            "| {} | {} | {} | {} | {} |\n",
+            "| {} {} | {} | {} | {} |\n",
             entry.fault.code(),
             entry.name,
             entry.condition,
-            entry.reaction,
-            entry.remedy
+            entry.remedy,
+            entry.reaction
         );
     }
     table
