@@ -8,10 +8,10 @@ use upright::table::Law;
 use upright_closed_loop::harness::{record, with_firmware};
 use upright_design::numerics::{Matrix, solve};
 use upright_design::plant::{ChainParameters, absolute_angles, linearise};
-use upright_design::rig::{PerJoint, Reality, Rig, SECTIONS};
+use upright_design::rig::{IMPERFECTIONS, Imperfection, PerJoint, Reality, Rig, SECTIONS};
 use upright_design::simulate::{FallKind, Scenario, run};
 use upright_design::table::TableValues;
-use upright_trust::verify::{IMPERFECTIONS, ImperfectionSettings, imperfections, required_imperfections};
+use upright_trust::verify::{ImperfectionSettings, imperfections, required_imperfections};
 
 fn load(name: &str) -> (Rig, TableValues) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
@@ -310,6 +310,10 @@ fn every_imperfection_is_a_key_of_reality() {
     }
 }
 
+fn named(key: &str) -> &'static Imperfection {
+    IMPERFECTIONS.iter().find(|one| one.key == key).unwrap()
+}
+
 #[test]
 fn a_required_size_is_run_and_one_that_makes_the_loop_fall_is_found() {
     let (mut rig, table) = load("quadruple-paper");
@@ -321,11 +325,10 @@ fn a_required_size_is_run_and_one_that_makes_the_loop_fall_is_found() {
         found.iter().map(|one| (one.key, one.size.unwrap(), one.verdict.stayed_on)).collect::<Vec<_>>()
     };
     assert_eq!(survived(&rig), []);
-    rig.verify.driver_lag_s = Some(2e-4);
-    rig.verify.joint_friction_n_m = Some(2e-5);
+    rig.must_survive = vec![(named("joint_friction_n_m"), 2e-5), (named("driver_lag_s"), 2e-4)];
     assert_eq!(survived(&rig), [("joint_friction_n_m", 2e-5, 4), ("driver_lag_s", 2e-4, 4)]);
     // Negative control: more friction than the loop survives.
-    rig.verify.joint_friction_n_m = Some(3e-4);
+    rig.must_survive[0].1 = 3e-4;
     assert_eq!(survived(&rig)[0], ("joint_friction_n_m", 3e-4, 0));
 }
 
@@ -340,7 +343,7 @@ fn a_requirement_and_reality_are_judged_with_a_set_point_that_moves() {
     };
     for (size_rad, stays_on) in [(1e-3, 2), (6e-3, 1)] {
         let (mut required, mut real) = (rig.clone(), rig.clone());
-        required.verify.homing_error_rad = Some(size_rad);
+        required.must_survive = vec![(named("homing_error_rad"), size_rad)];
         assert_eq!(found(&required), [("homing_error_rad", 2, stays_on)]);
         real.reality.sensors.homing_error_rad = PerJoint::all(size_rad);
         assert_eq!(found(&real), [("reality", 2, stays_on)]);

@@ -4,12 +4,10 @@ use crate::published::{rig, rig_and_table, rig_path};
 use upright::table::Law;
 use upright_closed_loop::harness::{record, with_firmware};
 use upright_design::parallel;
-use upright_design::rig::{PerJoint, Rig};
+use upright_design::rig::{IMPERFECTIONS, Imperfection, PerJoint, Rig};
 use upright_design::table::TableValues;
 use upright_plan::{Stored, SwingUpError, judge};
-use upright_trust::verify::{
-    IMPERFECTIONS, Imperfection, ImperfectionSettings, Survival, at_rest_disturbed, moving, survival,
-};
+use upright_trust::verify::{ImperfectionSettings, Survival, at_rest_disturbed, moving, survival};
 
 /// A size that is printed may differ by this share from the one at which the whole firmware turns the motor off.
 const TOLERANCE: f64 = 0.2;

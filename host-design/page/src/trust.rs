@@ -3,11 +3,10 @@
 use serde_json::{Value, json};
 use upright_design::design::Certified;
 use upright_design::number::significant;
-use upright_design::rig::Rig;
+use upright_design::rig::{Imperfection, Rig};
 use upright_design::table::TableValues;
 use upright_trust::verify::{
-    AttractionSettings, Imperfection, ImperfectionSettings, LawTrust, VerifyError, attraction, brief,
-    of_size, pushes, rows,
+    AttractionSettings, ImperfectionSettings, LawTrust, VerifyError, attraction, brief, of_size, pushes, rows,
 };
 
 use crate::refusal::PageRefusal;

@@ -3,7 +3,7 @@
 use upright::control::actuator::Drive;
 
 use crate::plant::{Actuation, MotorPlant};
-use crate::rig::{DriverFaults, Rig};
+use crate::rig::{DriverErrors, Rig};
 
 /// Below this share of the lag in a step, its moments are computed as series.
 const SERIES_BELOW: f64 = 0.5;
@@ -31,7 +31,7 @@ pub struct Driver {
 impl Driver {
     /// The driver of a rig, at rest; none if the force is the commanded one.
     pub fn of(rig: &Rig) -> Option<Self> {
-        let &DriverFaults { driver_lag_s, current_limit_a, supply_resistance_ohm, force_percent, .. } =
+        let &DriverErrors { driver_lag_s, current_limit_a, supply_resistance_ohm, force_percent, .. } =
             &rig.reality.driver;
         let lag_s = driver_lag_s.or(rig.actuator.driver_lag_s).unwrap_or(0.0);
         let motor = rig.actuator.motor.as_ref().map(MotorPlant::of);

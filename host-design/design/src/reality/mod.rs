@@ -7,11 +7,13 @@
 //! - [`StepMotor`]: the spring between field and rotor of a step motor.
 //! - [`Timing`]: when the force of a tick begins and ends.
 //! - [`RealEncoders`]: errors of encoders and of their zeros.
+//! - [`Imperfection::on`](crate::rig::Imperfection::on): a machine with one imperfection alone.
 //! - [`drawn_machine`], [`corner_machine`]: machines within the tolerances of `[robust]`.
 //!
 //! What a rig file leaves out is not simulated: the simulation then does the same operations as without `[reality]`,
 //! and has the same bits. `docs/reality.md` describes the keys.
 
+mod alone;
 mod belt;
 mod bristle;
 mod driver;

@@ -17,7 +17,7 @@ use super::sections::reality::Reality;
 use super::sections::robust::Tolerances;
 use super::sections::swing_up::SwingUpRules;
 use super::sections::tick::Tick;
-use super::sections::verify::Requirements;
+use super::sections::verify::{RequiredSize, Requirements};
 
 /// A rig file, read and checked.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -46,6 +46,9 @@ pub struct Rig {
     /// What `upright verify` requires.
     #[serde(skip)]
     pub verify: Requirements,
+    /// The imperfections that the loop has to survive, each alone, according to `[verify]`, with their sizes.
+    #[serde(skip)]
+    pub must_survive: Vec<RequiredSize>,
     /// How the simulated machine differs from the model.
     #[serde(skip)]
     pub reality: Reality,

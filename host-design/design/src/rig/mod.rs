@@ -45,6 +45,7 @@ pub use rule::Rule;
 pub use sections::actuator::{AccelerationDrive, Actuator, Motor};
 pub use sections::chain::{Cart, CartInput, Chain, MAX_LINKS, PlantDescription};
 pub use sections::friction::KnownFriction;
+pub use sections::imperfections::{Allowance, IMPERFECTIONS, Imperfection, LargestSize, Slider};
 pub use sections::integral::Integral;
 pub use sections::kalman::KalmanNoise;
 pub use sections::limits::Limits;
@@ -53,12 +54,12 @@ pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;
 pub use sections::reality::{
-    DriveTrain, DriverFaults, DryFriction, FrictionLaw, ParameterErrors, Reality, SensorErrors, StepMotorData,
+    DriveTrain, DriverErrors, DryFriction, FrictionLaw, ParameterErrors, Reality, SensorErrors, StepMotorData,
 };
-pub use sections::robust::Tolerances;
+pub use sections::robust::{ToleranceKey, Tolerances};
 pub use sections::swing_up::SwingUpRules;
 pub use sections::tick::Tick;
-pub use sections::verify::Requirements;
+pub use sections::verify::{RequiredSize, Requirements};
 pub use sections::{SECTIONS, TOP};
 pub use sensors::{AbsoluteRange, Sensor};
 pub use unusual::UnusualValue;

@@ -9,7 +9,7 @@ use super::sections::{
     robust, swing_up, tick, verify,
 };
 use super::value::Keys;
-use super::{Actuator, Integral, Limits, PlantDescription, Reality, Requirements, Rig, Tick};
+use super::{Actuator, Integral, Limits, PlantDescription, Reality, Rig, Tick};
 use crate::number::significant;
 
 /// Checks a whole rig file.
@@ -26,6 +26,8 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let states = plant.states();
     let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor.is_some());
     let reality = given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?;
+    let (verify, must_survive) = given(&verify::VERIFY)
+        .map_or(Ok(Default::default()), |node| verify::verify(&node, &actuator, &reality))?;
     let rig = Rig {
         name,
         robust: given(&robust::ROBUST)
@@ -44,8 +46,8 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
             .transpose()?,
         limits: given(&limits::LIMITS)
             .map_or(Ok(Limits::default()), |node| limits::limits(&node, &plant, input))?,
-        verify: given(&verify::VERIFY)
-            .map_or(Ok(Requirements::default()), |node| verify::verify(&node, input, &reality))?,
+        verify,
+        must_survive,
         reality,
         actuator,
         tick,

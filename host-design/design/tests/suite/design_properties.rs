@@ -42,6 +42,7 @@ fn any_rig(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Rig
 fn bare(chain: Chain) -> Rig {
     Rig {
         verify: Default::default(),
+        must_survive: Vec::new(),
         reality: Default::default(),
         robust: None,
         swing_up: None,

@@ -85,6 +85,7 @@ fn what_is_left_out_gets_its_documented_default() {
     };
     let expected = Rig {
         verify: Default::default(),
+        must_survive: Vec::new(),
         reality: Default::default(),
         robust: None,
         swing_up: None,

@@ -16,7 +16,7 @@ use super::challenge::Challenge;
 use super::console::Console;
 use super::holding::ManualHold;
 use super::pace::SimulationPace;
-use super::property::Properties;
+use super::property::{COARSENESS, DELAY, FORCE_NOISE, Properties};
 use super::pull::{Pull, PulledPoint, Spring};
 use super::request::{Holding, MachineRequest};
 
@@ -158,7 +158,7 @@ impl<'a, 't> World<'a, 't> {
     fn rebuild(&mut self) -> Result<(), HarnessError> {
         let rig = self.properties.applied_to(self.machine.rig);
         let scenario = Scenario {
-            force_noise_n: self.properties.get("force-noise"),
+            force_noise_n: self.properties.get(FORCE_NOISE),
             torque_noise_n_m: Disturbance::of(self.machine.rig).torque_n_m,
             ..self.machine.scenario.clone()
         };
@@ -245,7 +245,7 @@ impl<'a, 't> World<'a, 't> {
             defect.output(&mut output);
         }
         self.delayed.push_back(output);
-        while self.delayed.len() > self.properties.get("delay") as usize + 1 {
+        while self.delayed.len() > self.properties.get(DELAY) as usize + 1 {
             self.delayed.pop_front();
         }
         let output = self.delayed.front().copied().unwrap_or(Output::OFF);
@@ -312,7 +312,7 @@ impl<'a, 't> World<'a, 't> {
 
     /// Coarser encoders: the counters move in steps of several counts.
     fn coarsen(&self, inputs: &mut Pins) {
-        let step = self.properties.get("coarseness") as i64;
+        let step = self.properties.get(COARSENESS) as i64;
         if step <= 1 {
             return;
         }

@@ -73,7 +73,7 @@ pub(super) fn limit_cycles(source: &ReportSource<'_>) -> Result<Figure, VerifyEr
     let x = Axis::log("Coulomb friction of each joint (N·m)");
     let mut panel = Panel::new(x, Axis::linear("largest angle of a link (mrad)")).high(360);
     for (number, found) in imperfections.iter().enumerate() {
-        let friction = found.alone.iter().find(|one| one.imperfection.key == "joint_friction_n_m");
+        let friction = found.alone.iter().find(|one| !one.bristles.is_empty());
         let Some(friction) = friction else { continue };
         let cycle = limit_cycle(rig, table, found.law, &found.settings, friction)?;
         let survival = cycle.iter().filter(|(_, verdict)| verdict.survived == found.settings.seeds);

@@ -46,9 +46,8 @@ pub use covariance::NoiseShare;
 pub use encoder::{CoarsestEncoder, EncoderSettings, coarser, coarsest_encoder};
 pub use error::VerifyError;
 pub use imperfections::{
-    Cure, IMPERFECTIONS, Imperfection, ImperfectionSettings, Imperfections, LeftOut, OfBristle,
-    RequiredSurvival, SizeRuns, Survival, imperfections, limit_cycle, of_size, required_imperfections,
-    survival,
+    BristleSurvival, Cure, ImperfectionSettings, Imperfections, LeftOut, RequiredSurvival, SizeRuns,
+    Survival, imperfections, limit_cycle, of_size, required_imperfections, survival,
 };
 pub use lag::LagLimits;
 pub use linear::{LinearReport, linear, margins_of};

@@ -4,11 +4,9 @@ use std::path::Path;
 
 use upright::control::actuator::Drive;
 use upright::table::Law;
-use upright_design::rig::Rig;
+use upright_design::rig::{IMPERFECTIONS, Imperfection, Rig};
 use upright_design::simulate::{Bench, FallKind, Scenario};
-use upright_trust::verify::{
-    IMPERFECTIONS, Imperfection, ImperfectionSettings, SizeRuns, imperfections, of_size,
-};
+use upright_trust::verify::{ImperfectionSettings, SizeRuns, imperfections, of_size};
 
 use crate::published::{rig, rig_path, table};
 
@@ -62,7 +60,7 @@ fn friction_of_the_cart_changes_nothing_before_the_motor_slips() {
     let friction = named("cart_friction_n");
     assert!(friction.not_on(&rig("single-stepper")).is_some());
     let motor = with_motor("[verify]\ncart_friction_n = 10");
-    assert_eq!((friction.not_on(&motor), motor.verify.cart_friction_n), (None, Some(10.0)));
+    assert_eq!((friction.not_on(&motor), &motor.must_survive[..]), (None, &[(friction, 10.0)][..]));
     assert_eq!(with(&motor, "cart_friction_n", 10.0).stayed_on, 1);
     assert_eq!(with(&motor, "cart_friction_n", 100.0).stayed_on, 0, "negative control");
 }

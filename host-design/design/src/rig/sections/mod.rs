@@ -8,6 +8,7 @@
 pub(super) mod actuator;
 pub(super) mod chain;
 pub(super) mod friction;
+pub(super) mod imperfections;
 pub(super) mod integral;
 pub(super) mod kalman;
 pub(super) mod limits;

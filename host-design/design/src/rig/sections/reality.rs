@@ -17,7 +17,7 @@ pub(crate) static REALITY: Section = Section {
         DryFriction::KEYS,
         AirDrag::KEYS,
         DriveTrain::KEYS,
-        DriverFaults::KEYS,
+        DriverErrors::KEYS,
         StepMotorData::KEYS,
         SensorErrors::KEYS,
         ParameterErrors::KEYS,
@@ -69,7 +69,7 @@ keys! {
 
 keys! {
     /// Errors of motor driver and supply, and of the instants at which a force begins.
-    pub struct DriverFaults {
+    pub struct DriverErrors {
         driver_lag_s: Option<f64>, "s", Rule::NOT_NEGATIVE, "real time constant of the motor driver",
             Absent::Follows("that of [actuator]");
         current_limit_a: Option<f64>, "A", Rule::POSITIVE, "largest current of the motor driver",
@@ -167,7 +167,7 @@ pub struct Reality {
     /// Backlash and belt.
     pub drive_train: DriveTrain,
     /// Motor driver, supply and timing.
-    pub driver: DriverFaults,
+    pub driver: DriverErrors,
     /// The motor of a drive with pulses.
     pub step_motor: StepMotorData,
     /// Encoders, their zeros, and the slope of the rail.
@@ -196,8 +196,8 @@ impl Default for Reality {
 }
 
 /// Keys of what lies between a force and the cart.
-pub(super) fn of_force() -> Vec<&'static str> {
-    [DriveTrain::KEYS, DriverFaults::KEYS].concat().iter().map(|key| key.name).collect()
+fn of_force() -> Vec<&'static str> {
+    [DriveTrain::KEYS, DriverErrors::KEYS].concat().iter().map(|key| key.name).collect()
 }
 
 /// Reads `[reality]`, which needs a chain.
@@ -217,7 +217,7 @@ pub(crate) fn reality(
         friction_law: FrictionLaw::default(),
         air_drag: AirDrag::read(&table)?,
         drive_train: DriveTrain::read(&table)?,
-        driver: DriverFaults::read(&table)?,
+        driver: DriverErrors::read(&table)?,
         step_motor: StepMotorData::read(&table)?,
         sensors: SensorErrors::read(&table)?,
         parameters: ParameterErrors::read(&table)?,
@@ -290,7 +290,7 @@ fn within_the_rig(
     if reality.drive_train.rotor_mass_kg.zip(chain.cart.mass_kg).is_some_and(|(mass, cart)| mass >= cart) {
         refused("rotor_mass_kg", "a number > 0 and < mass_kg of [cart]", "give the smaller part of it")?;
     }
-    let DriverFaults { latency_s, jitter_s, .. } = reality.driver;
+    let DriverErrors { latency_s, jitter_s, .. } = reality.driver;
     if 2.0 * jitter_s + latency_s >= period_s {
         let name = if latency_s >= period_s { "latency_s" } else { "jitter_s" };
         let remedy = "give less, or set delay_ticks = 1 in [tick] for a further tick of delay";

@@ -35,6 +35,32 @@ keys! {
     }
 }
 
+/// One of the tolerances.
+#[derive(Debug, Clone, Copy)]
+pub struct ToleranceKey {
+    /// Its key in `[robust]`.
+    pub key: &'static str,
+    /// Its value.
+    pub at: fn(&mut Tolerances) -> &mut f64,
+}
+
+macro_rules! tolerance {
+    ($key:ident) => {
+        ToleranceKey { key: stringify!($key), at: |tolerances| &mut tolerances.$key }
+    };
+}
+
+impl Tolerances {
+    /// The error of the masses.
+    pub const MASS: ToleranceKey = tolerance!(mass_percent);
+    /// The friction of the joints.
+    pub const JOINT_FRICTION: ToleranceKey = tolerance!(joint_friction_n_m);
+    /// The friction of the cart.
+    pub const CART_FRICTION: ToleranceKey = tolerance!(cart_friction_n);
+    /// The errors of the zeros.
+    pub const HOMING_ERROR: ToleranceKey = tolerance!(homing_error_rad);
+}
+
 impl Default for Tolerances {
     fn default() -> Self {
         Tolerances::when_absent().expect("no key of [robust] is required")

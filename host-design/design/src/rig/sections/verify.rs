@@ -5,8 +5,9 @@ use super::super::key::{Absent, Section};
 use super::super::node::Node;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
-use super::chain::CartInput;
-use super::reality::{Reality, of_force};
+use super::actuator::Actuator;
+use super::imperfections::{IMPERFECTIONS, Imperfection, REQUIRED_SIZES};
+use super::reality::Reality;
 
 /// `[verify]`
 pub(crate) static VERIFY: Section = Section {
@@ -14,10 +15,8 @@ pub(crate) static VERIFY: Section = Section {
     title: "[verify]",
     meaning: "what `upright verify` requires of each law; changes no gain",
     absent: Absent::Follows("as below"),
-    keys: &[Requirements::KEYS],
+    keys: &[Requirements::KEYS, &REQUIRED_SIZES],
 };
-
-const NOT_REQUIRED: Absent = Absent::Follows("not required");
 
 keys! {
     /// Thresholds of the trust report. They change no gain, so they are not part of the rig's hash.
@@ -52,52 +51,29 @@ keys! {
         torque_rms_n_m: Option<f64>, "N·m", Rule::NOT_NEGATIVE,
             "rms of the disturbing torque at each joint in the runs, drawn again each tick",
             Absent::Follows("what [kalman] expects");
-        joint_friction_n_m: Option<f64>, "N·m", Rule::POSITIVE,
-            "Coulomb friction in each joint that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        cart_friction_n: Option<f64>, "N", Rule::POSITIVE,
-            "Coulomb friction of the cart that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        homing_error_rad: Option<f64>, "rad", Rule::ANGLE,
-            "error of each joint's zero that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        eccentricity_rad: Option<f64>, "rad", Rule::ANGLE,
-            "amplitude of each joint encoder's once-per-turn error that the loop has to survive as the only \
-             imperfection",
-            NOT_REQUIRED;
-        twice_per_turn_rad: Option<f64>, "rad", Rule::ANGLE,
-            "amplitude of each joint sensor's twice-per-turn error that the loop has to survive as the only \
-             imperfection",
-            NOT_REQUIRED;
-        sensor_delay_s: Option<f64>, "s", Rule::POSITIVE,
-            "age of the joints' readings that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        rail_tilt_rad: Option<f64>, "rad", Rule::ANGLE,
-            "slope of the rail that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        backlash_m: Option<f64>, "m", Rule::POSITIVE,
-            "play between motor and cart that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        belt_compliance_m_per_n: Option<f64>, "m/N", Rule::POSITIVE,
-            "stretch of belt or gear per force that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        driver_lag_s: Option<f64>, "s", Rule::POSITIVE,
-            "time constant of the motor driver, beyond the stated one, that the loop has to survive as the only \
-             imperfection",
-            NOT_REQUIRED;
-        latency_s: Option<f64>, "s", Rule::POSITIVE.worded("a number > 0 and < period_s"),
-            "additional delay of the force that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        force_percent: Option<f64>, "%", Rule::POSITIVE,
-            "excess of the real force that the loop has to survive as the only imperfection", NOT_REQUIRED;
-        parameter_spread_percent: Option<f64>, "%", Rule::SPREAD,
-            "spread (±) of all masses, lengths and inertias that the loop has to survive as the only imperfection",
-            NOT_REQUIRED;
     }
 }
 
-/// Reads `[verify]`; imperfections that are not simulated with a drive with pulses cannot be required.
-pub(crate) fn verify(node: &Node<'_>, input: CartInput, reality: &Reality) -> Result<Requirements, RigError> {
+/// A size of an imperfection that the loop has to survive.
+pub type RequiredSize = (&'static Imperfection, f64);
+
+/// Reads `[verify]`: the thresholds, and the sizes of imperfections. What is not simulated with this drive cannot be
+/// required.
+pub(crate) fn verify(
+    node: &Node<'_>,
+    actuator: &Actuator,
+    reality: &Reality,
+) -> Result<(Requirements, Vec<RequiredSize>), RigError> {
     let table = node.table(&VERIFY)?;
-    if input == CartInput::Acceleration {
-        table.refuse_for_acceleration(&of_force())?;
-        if reality.step_motor.holding_force_n.is_none() {
-            table.refuse_for_acceleration(&["cart_friction_n"])?;
+    let requirements = Requirements::read(&table)?;
+    let mut sizes = Vec::new();
+    for imperfection in &IMPERFECTIONS {
+        if imperfection.not_with(actuator, reality).is_some() {
+            table.refuse_for_acceleration(&[imperfection.key])?;
         }
+        sizes.extend(table.value::<Option<f64>>(imperfection.key)?.map(|size| (imperfection, size)));
     }
-    Requirements::read(&table)
+    Ok((requirements, sizes))
 }
 
 impl Default for Requirements {

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright::table::Law;
-use upright_design::rig::Rig;
+use upright_design::rig::{Imperfection, Rig};
 use upright_design::simulate::simulate;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
 use upright_trust::verify::{
-    Effort, Horizon, Imperfection, ImperfectionSettings, Imperfections, MapAxis, TrustReport, attraction_map,
-    monte_carlo, sample, spread, trust,
+    Effort, Horizon, ImperfectionSettings, Imperfections, MapAxis, TrustReport, attraction_map, monte_carlo,
+    sample, spread, trust,
 };
 
 use crate::failure::Failure;

@@ -2,11 +2,10 @@
 
 use upright::table::Law;
 
-use super::catalogue::Imperfection;
 use crate::verify::VerifyError;
 use upright_design::design::Uncertified;
 use upright_design::number::{rounded, significant};
-use upright_design::rig::{CartInput, Rig, Tolerances};
+use upright_design::rig::{Actuator, Allowance, CartInput, Imperfection, Rig, ToleranceKey, Tolerances};
 use upright_design::table::TableValues;
 
 /// Friction of the cart, as a share of the largest force, for what acts like an unknown force.
@@ -28,10 +27,10 @@ impl<'a> Cures<'a> {
         let own = Uncertified::sampled_alone(&rig.with_law_alone(law))?;
         let mut cures = Self { rig, table, law, own, of_all: Vec::new() };
         let friction_n = rounded(FORCE_SHARE * rig.force_limit_n().unwrap_or_default(), 2);
-        cures.of_all = [("cart_friction_n", friction_n), ("homing_error_rad", ZERO_RAD)]
+        cures.of_all = [(Tolerances::CART_FRICTION, friction_n), (Tolerances::HOMING_ERROR, ZERO_RAD)]
             .into_iter()
             .filter(|(_, size)| *size > 0.0)
-            .filter_map(|(key, size)| cures.tolerating(key, size))
+            .filter_map(|(tolerance, size)| cures.tolerating(tolerance, size))
             .collect();
         let input = match rig.actuator.input() {
             CartInput::Force => "force_noise_n2_s",
@@ -46,44 +45,39 @@ impl<'a> Cures<'a> {
     /// The changes that are tried for this imperfection.
     pub(super) fn of_imperfection(&self, imperfection: &Imperfection) -> Vec<(String, TableValues)> {
         let [good, poor] = imperfection.typical;
-        let key = match imperfection.key {
-            "parameter_spread_percent" => "mass_percent",
-            key => key,
+        let own = match imperfection.allowance {
+            None => [None, None],
+            Some(Allowance::Tolerated(tolerance)) => {
+                [poor, (good * poor).sqrt()].map(|size| self.tolerating(tolerance, rounded(size, 2)))
+            }
+            Some(Allowance::Stated { key, at }) => [2.0 * poor, poor].map(|size| self.stating(key, at, size)),
         };
-        let own = [poor, (good * poor).sqrt()].map(|size| self.tolerating(key, rounded(size, 2)));
-        let stated = (key == "driver_lag_s").then(|| [2.0 * poor, poor].map(|lag_s| self.stating(lag_s)));
-        own.into_iter()
-            .chain(stated.into_iter().flatten())
-            .flatten()
-            .chain(self.of_all.iter().cloned())
-            .collect()
+        own.into_iter().flatten().chain(self.of_all.iter().cloned()).collect()
     }
 
-    /// `[actuator]` with this lag of the driver (s), for which the law is designed; none if one is stated already, or
-    /// where none can be.
-    fn stating(&self, lag_s: f64) -> Option<(String, TableValues)> {
-        let actuator = &self.rig.actuator;
-        if actuator.driver_lag_s.is_some() || !actuator.input().is_force() {
+    /// `[actuator]` with this size of this key, for which the law is designed; none if one is stated already.
+    fn stating(
+        &self,
+        key: &str,
+        at: fn(&mut Actuator) -> &mut Option<f64>,
+        size: f64,
+    ) -> Option<(String, TableValues)> {
+        let mut rig = self.rig.with_law_alone(self.law);
+        if at(&mut rig.actuator).replace(size).is_some() {
             return None;
         }
-        let mut rig = self.rig.with_law_alone(self.law);
-        rig.actuator.driver_lag_s = Some(lag_s);
         let table = TableValues::of_uncertified(&rig, &Uncertified::sampled_alone(&rig).ok()?).ok()?;
-        Some((format!("actuator.driver_lag_s = {}", significant(lag_s, 2)), table))
+        Some((format!("actuator.{key} = {}", significant(size, 2)), table))
     }
 
-    /// `[robust]` with this tolerance, which widens the thresholds of fault detection; none if there is no such key.
-    fn tolerating(&self, key: &str, size: f64) -> Option<(String, TableValues)> {
+    /// `[robust]` with this tolerance, which widens the thresholds of fault detection; none for friction
+    /// of a cart that goes where its pulses say.
+    fn tolerating(&self, ToleranceKey { key, at }: ToleranceKey, size: f64) -> Option<(String, TableValues)> {
         let mut tolerances = self.rig.robust.clone().unwrap_or_default();
-        let Tolerances { mass_percent, joint_friction_n_m, cart_friction_n, homing_error_rad, .. } =
-            &mut tolerances;
-        *match key {
-            "mass_percent" => mass_percent,
-            "joint_friction_n_m" => joint_friction_n_m,
-            "cart_friction_n" if self.rig.actuator.input().is_force() => cart_friction_n,
-            "homing_error_rad" => homing_error_rad,
-            _ => return None,
-        } = size;
+        *at(&mut tolerances) = size;
+        if tolerances.cart_friction_n > 0.0 && !self.rig.actuator.input().is_force() {
+            return None;
+        }
         let rig = Rig { robust: Some(tolerances), ..self.rig.clone() };
         let mut table = self.table.clone();
         table.thresholds = TableValues::of_uncertified(&rig, &self.own).ok()?.thresholds;

@@ -1,7 +1,6 @@
 //! The sizes at which the imperfections of a machine, each one alone, make the loop fall, and those at which the
 //! firmware turns the motor off, beside their typical sizes.
 
-mod catalogue;
 mod cure;
 mod search;
 mod survival;
@@ -9,17 +8,15 @@ mod survival;
 use upright::table::Law;
 
 use super::error::{VerifyError, chain, within};
-use upright_design::parallel;
-use upright_design::rig::{Reality, Rig};
-use upright_design::table::TableValues;
-
-pub use catalogue::{IMPERFECTIONS, Imperfection};
 use cure::Cures;
 pub(super) use search::first;
-use search::{Setpoint, SizeSearch};
+use search::{LARGEST_OF_TICK, Setpoint, SizeSearch};
+use upright_design::parallel;
+use upright_design::rig::{Imperfection, LargestSize, Reality, RequiredSize, Rig};
+use upright_design::table::TableValues;
 
 pub use survival::{
-    Cure, ImperfectionSettings, Imperfections, LeftOut, OfBristle, RequiredSurvival, SizeRuns, Survival,
+    BristleSurvival, Cure, ImperfectionSettings, Imperfections, LeftOut, RequiredSurvival, SizeRuns, Survival,
 };
 
 /// The requirement of all imperfections of the rig file.
@@ -99,21 +96,21 @@ pub fn required_imperfections(
     settings: &ImperfectionSettings,
 ) -> Result<Vec<RequiredSurvival>, VerifyError> {
     chain(rig, "imperfections")?;
-    let latency_s = rig.verify.latency_s.unwrap_or_default();
-    within("latency_s", latency_s, 0.0..=0.999 * rig.tick.period_s, "less than period_s")?;
     let search = SizeSearch { rig, table, law, settings };
-    let required = |imperfection: &'static Imperfection| {
-        let size = (imperfection.required)(&rig.verify)?;
+    let required = |&(imperfection, size): &RequiredSize| {
         let Imperfection { key, requirement, .. } = *imperfection;
-        let survival = |verdict| RequiredSurvival { key, requirement, size: Some(size), verdict };
-        Some(search.alone(imperfection, size, Setpoint::RestsAndMoves).map(survival))
+        if imperfection.largest == LargestSize::Tick {
+            within(key, size, 0.0..=LARGEST_OF_TICK * rig.tick.period_s, "less than period_s")?;
+        }
+        let verdict = search.alone(imperfection, size, Setpoint::RestsAndMoves)?;
+        Ok(RequiredSurvival { key, requirement, size: Some(size), verdict })
     };
     let of_reality = || {
         let verdict = search.verdict(rig, Setpoint::RestsAndMoves)?;
         Ok(RequiredSurvival { key: "reality", requirement: OF_REALITY, size: None, verdict })
     };
     let whole = (rig.reality != Reality::default()).then(of_reality);
-    IMPERFECTIONS.iter().filter_map(required).chain(whole).collect::<Result<_, VerifyError>>()
+    rig.must_survive.iter().map(required).chain(whole).collect::<Result<_, VerifyError>>()
 }
 
 /// The limit cycle as a function of the size of an imperfection: sizes below the one at which the loop falls, or below

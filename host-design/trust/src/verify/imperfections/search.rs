@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 
 use upright::table::Law;
 
-use super::catalogue::Imperfection;
-use super::survival::{Cure, ImperfectionSettings, OfBristle, SizeRuns, Survival};
+use super::survival::{BristleSurvival, Cure, ImperfectionSettings, SizeRuns, Survival};
 use crate::verify::error::VerifyError;
 use crate::verify::trial::{
     Horizon, Outcome, disturbed, leaning, moving, trial, trial_from_power_up, waking_lean,
 };
 use upright_design::parallel;
-use upright_design::rig::Rig;
+use upright_design::rig::{Imperfection, LargestSize, Rig};
 use upright_design::simulate::{FallKind, Scenario, Sensing};
 use upright_design::table::TableValues;
 
@@ -19,6 +18,8 @@ use upright_design::table::TableValues;
 const RANGE: [f64; 2] = [1.0 / 64.0, 64.0];
 /// A change of the rig file is a cure if the motor stays on up to this many times the size.
 const CURES: f64 = 1.2;
+/// Largest share of a tick that a delay within it may have.
+pub(super) const LARGEST_OF_TICK: f64 = 0.999;
 
 /// What has to survive a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,10 +60,10 @@ impl SizeSearch<'_> {
         changed: &[(String, TableValues)],
     ) -> Result<Survival, VerifyError> {
         let [_, largest_tried] = self.range(imperfection);
-        let of_bristles = imperfection.bristles_rad().into_iter().map(|bristle_rad| {
+        let of_bristles = imperfection.bristles().into_iter().map(|bristle_rad| {
             let first = |judge| {
                 self.first(imperfection, &|size| {
-                    self.end(&[imperfection.on_with(self.rig, size, bristle_rad)], judge)
+                    self.end(&[imperfection.on_with_bristle(self.rig, size, bristle_rad)], judge)
                 })
             };
             Ok((
@@ -94,7 +95,12 @@ impl SizeSearch<'_> {
                 .filter_map(|(bristle_rad, falls, off, moving)| {
                     let [falls_at, turned_off_at, off_moving_at] =
                         [falls, off, moving].map(|at| at.map(|(size, _)| size));
-                    Some(OfBristle { bristle_rad: bristle_rad?, falls_at, turned_off_at, off_moving_at })
+                    Some(BristleSurvival {
+                        bristle_rad: bristle_rad?,
+                        falls_at,
+                        turned_off_at,
+                        off_moving_at,
+                    })
                 })
                 .collect(),
             largest_tried,
@@ -130,12 +136,10 @@ impl SizeSearch<'_> {
     /// The smallest and the largest size that are tried.
     fn range(&self, imperfection: &Imperfection) -> [f64; 2] {
         let [good, poor] = imperfection.typical;
-        let most = match imperfection.key {
-            // Masses and lengths cannot be wrong by more than nine tenths.
-            "parameter_spread_percent" => 80.0,
-            // The simulated force begins within its tick.
-            "latency_s" => 0.999 * self.rig.tick.period_s,
-            _ => f64::INFINITY,
+        let most = match imperfection.largest {
+            LargestSize::Any => f64::INFINITY,
+            LargestSize::Of(size) => size,
+            LargestSize::Tick => LARGEST_OF_TICK * self.rig.tick.period_s,
         };
         [RANGE[0] * good, (RANGE[1] * poor).min(most)]
     }

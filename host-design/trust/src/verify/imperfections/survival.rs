@@ -3,11 +3,9 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::catalogue::{IMPERFECTIONS, Imperfection};
 use upright_design::number::significant;
-use upright_design::rig::Rig;
-use upright_design::simulate::Disturbance;
-use upright_design::simulate::FallKind;
+use upright_design::rig::{IMPERFECTIONS, Imperfection, Rig};
+use upright_design::simulate::{Disturbance, FallKind};
 
 /// Settings of the search for the sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -68,7 +66,7 @@ pub struct Survival {
     pub tried: Vec<String>,
     /// For joint friction, the sizes for each of the bristle lengths; the sizes above are the smaller ones.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub bristles: Vec<OfBristle>,
+    pub bristles: Vec<BristleSurvival>,
     /// Largest size tried.
     pub largest_tried: f64,
     /// Typical size in a poor machine over the smallest of these sizes: above 1 the imperfection is dangerous.
@@ -86,7 +84,7 @@ pub struct Cure {
 
 /// Sizes of joint friction that builds up over this angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct OfBristle {
+pub struct BristleSurvival {
     /// The angle (rad): `presliding_rad` of `[reality]`.
     pub bristle_rad: f64,
     /// As in [`Survival`].
@@ -100,7 +98,7 @@ pub struct OfBristle {
 impl Survival {
     /// What was found beside the sizes: the sizes for each bristle length, and the cure.
     pub fn remarks(&self) -> Vec<String> {
-        let of_bristle = |of: &OfBristle| {
+        let of_bristle = |of: &BristleSurvival| {
             let [falls, off, moving] =
                 [of.falls_at, of.turned_off_at, of.off_moving_at].map(|size| self.size_text(size));
             let bristle = significant(of.bristle_rad, 2);
