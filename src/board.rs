@@ -146,8 +146,7 @@ impl Output {
     }
 }
 
-/// The hardware. Each board implements this trait; so do the image in the loop with a simulated rig and the
-/// simulations on the host.
+/// The hardware. Each board implements this trait; so do the simulations on the host.
 pub trait Board<const NY: usize> {
     /// Widths of the encoder counters.
     const WIDTHS: [CounterWidth; NY];

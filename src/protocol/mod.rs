@@ -2,7 +2,7 @@
 //!
 //! [`message`] defines the requests, answers and telemetry: a new message belongs there. [`frame`] defines the frames
 //! for all of them, [`serial_link`] sends and receives them beside the control task, [`queue`] connects the two, and
-//! [`simulated_pins`] replaces the wires when an image runs in the loop with a simulation.
+//! [`simulated_pins`] replaces the wires when the firmware runs with a simulation, and records them.
 //!
 //! ```
 //! use upright::protocol::frame::{Receiver, encode};

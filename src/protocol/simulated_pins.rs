@@ -1,4 +1,5 @@
-//! Simulated pins: the messages that replace the wires to the rig when an image runs in the loop with a simulation.
+//! Simulated pins: the messages that replace the wires to the rig when the firmware runs with a simulation, and with
+//! which a run is recorded and replayed.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -15,7 +16,7 @@ pub const MAX_PINS_OUT: usize = 32;
 /// Added to the reading of a link's sensor, which has 16 bits: the sample is bad, as a board may know by parity.
 pub const BAD_SAMPLE: u32 = 1 << 16;
 
-/// Host to image: the inputs of one tick.
+/// Host to firmware: the inputs of one tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PinsIn<const NY: usize> {
     /// Raw encoder counters.
@@ -41,7 +42,7 @@ pub enum InjectedFault {
     StackOverflow,
 }
 
-/// Image to host: the output of one tick.
+/// Firmware to host: the output of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PinsOut {
     /// What the motor is driven with.

@@ -6,9 +6,7 @@ use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source};
 use upright_test_support::limits::output;
 use upright_test_support::repository;
-use upright_tool::image::{BuildError, Compiler, ImageKind, PROFILE, TARGET, build, build_for, compiler};
-
-pub(crate) use upright_test_support::equipment::in_qemu;
+use upright_tool::image::{BoardName, BuildError, Compiler, PROFILE, TARGET, build_for, compiler};
 
 /// What was built or found; `None` if it needs the missing compiler for the image. `what` it is for.
 pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Option<T> {
@@ -16,14 +14,9 @@ pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Optio
     upright_test_support::equipment::if_possible(result, is_missing, what)
 }
 
-/// The image with the committed gain table.
-pub(crate) fn built(kind: ImageKind) -> Option<PathBuf> {
-    if_possible(build(kind), "an image")
-}
-
 /// The image with this table.
-pub(crate) fn built_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
-    if_possible(build_for(kind, rig, table), "an image")
+pub(crate) fn built_for(board: BoardName, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
+    if_possible(build_for(board, rig, table), "an image")
 }
 
 /// Builds the crate in this folder of `boards/` with a table; returns the folder of what was built.

@@ -1,29 +1,25 @@
 //! The whole firmware in closed loop gives the same bits three times: in a simulation of the controller alone, with
-//! all tasks on the host, and as an image in QEMU.
+//! all tasks on the host, and as the flashed image on the virtual board.
 //!
-//! Without a compiler for the image, or without QEMU, the tests that need them say so and pass. If the environment
-//! variable `UPRIGHT_REQUIRE_IMAGE` is set, they fail.
+//! Without a compiler for the image, the tests that need it say so and pass. If the environment variable
+//! `UPRIGHT_REQUIRE_IMAGE` is set, they fail.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
-use crate::equipment::{built, built_for, in_qemu};
+use crate::equipment::built_for;
 use crate::published::{rig, rig_and_table, rig_path, stored_motions, table};
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright::table::checksum::crc32;
-use upright_closed_loop::harness::{Pins, Recording, Session, Target};
+use upright_board::Image;
+use upright_closed_loop::harness::{HarnessError, Pins, Recording, Session, Target, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::table::TableValues;
-use upright_plan::{Route, StoredTransitions, hangs, up_and_down, with_motions};
-use upright_tool::image::ImageKind;
-use upright_tool::in_the_loop::{PinLink, RunError, RunPlace, run};
-
-/// Upper bound on the instructions in a tick of the image, with telemetry in every tick: 10 % above the count with
-/// Rust 1.96.
-const MOST_INSTRUCTIONS: u32 = 3850;
+use upright_plan::{Route, StoredTransitions, with_motions};
+use upright_tool::image::BoardName;
+use upright_tool::in_the_loop::{Compared, RunPlace, VirtualBoard, run, run_compared};
 
 fn quadruple() -> (Rig, TableValues) {
     rig_and_table("quadruple-paper").clone()
@@ -58,9 +54,14 @@ pub(crate) fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
     scenarios
 }
 
-/// The image, if its compiler and QEMU are both installed.
-fn image(kind: ImageKind) -> Option<PathBuf> {
-    in_qemu(built(kind))
+/// The image with this table, if its compiler is installed.
+fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
+    let elf = built_for(BoardName::WeactF405, rig, table)?;
+    Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
+}
+
+fn powered_on(image: &Image, table: &TableValues) -> VirtualBoard {
+    VirtualBoard::start(image, &BoardName::WeactF405.conditions(1), table).unwrap()
 }
 
 fn forces_and_estimates(recording: &Recording) -> Vec<(f64, f64, Vec<f64>)> {
@@ -80,62 +81,47 @@ fn all_tasks_together_give_the_bits_of_the_controller_alone() {
 }
 
 #[test]
-fn the_image_in_qemu_gives_the_bits_of_the_host_and_of_its_last_run() {
-    let Some(image) = image(ImageKind::InTheLoop) else { return };
+fn the_flashed_image_gives_the_bits_of_the_host_and_of_its_last_run() {
     let (rig, table) = quadruple();
-    let place = RunPlace::Qemu { image: &image, link: PinLink::Files };
+    let Some(image) = image(&rig, &table) else { return };
+    let run = |scenario: &Scenario| {
+        run_compared(&rig, &table, scenario, &mut powered_on(&image, &table)).unwrap().0
+    };
     for (name, scenario) in scenarios(&rig, true) {
-        let qemu = run(&rig, &table, &scenario, place).unwrap();
-        let host = run(&rig, &table, &scenario, RunPlace::Host).unwrap();
-        assert!(qemu.ticks == host.ticks, "{name}");
-        assert!(qemu.summary.survives(), "{name}: {:?}", qemu.fault);
-        let again = run(&rig, &table, &scenario, place).unwrap();
-        assert_eq!((&qemu.ticks, qemu.worst_cycles), (&again.ticks, again.worst_cycles), "{name}");
-        // Negative control: the comparison sees another seed.
-        let other = Scenario { seed: 8, ..scenario };
-        assert!(run(&rig, &table, &other, RunPlace::Host).unwrap().ticks != host.ticks, "{name}");
+        let on_board = run(&scenario);
+        assert!(on_board.summary.survives(), "{name}: {:?}", on_board.fault);
+        if name == "lqr-step" {
+            let is_same = |other: Recording| {
+                (&other.ticks, other.worst_cycles) == (&on_board.ticks, on_board.worst_cycles)
+            };
+            assert!(is_same(run(&scenario)), "{name}");
+            // Negative control: the comparison sees another seed.
+            assert!(!is_same(run(&Scenario { seed: 8, ..scenario })), "{name}");
+        }
     }
 }
 
 #[test]
-fn the_image_in_qemu_raises_and_lowers_the_links_with_the_bits_of_the_host() {
-    let (rig, table) = with_stored_motions("single-quanser-ip02", &[]);
-    let Some(image) = in_qemu(built_for(ImageKind::InTheLoop, &rig, &table)) else { return };
-    let scenario = up_and_down(&rig, &table, 0.5).unwrap();
-    let qemu = run(&rig, &table, &scenario, RunPlace::Qemu { image: &image, link: PinLink::Files }).unwrap();
-    println!("{} instructions in the longest tick", qemu.worst_cycles);
-    assert!(hangs(&qemu), "{:?}", qemu.fault);
-    assert!(qemu.ticks == run(&rig, &table, &scenario, RunPlace::Host).unwrap().ticks);
-    // Negative control: the comparison sees another seed.
-    let other = Scenario { seed: 8, ..scenario };
-    assert!(run(&rig, &table, &other, RunPlace::Host).unwrap().ticks != qemu.ticks);
-}
-
-#[test]
-fn the_image_in_qemu_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_host() {
+fn the_flashed_image_goes_from_equilibrium_to_equilibrium_with_the_bits_of_the_host() {
     let (rig, table) = with_stored_motions("double-quanser-dbpen", &["uu-ud", "ud-dd"]);
-    let Some(image) = in_qemu(built_for(ImageKind::InTheLoop, &rig, &table)) else { return };
+    let Some(image) = image(&rig, &table) else { return };
     // Up, on to the equilibrium at which the second link hangs, and down.
     let route = Route::of(&rig, &table).unwrap();
     let mut scenario = route.scenario(&rig, 7);
     scenario.goals.truncate(2);
     scenario.duration_s = route.begin_s[3] - 7.0;
-    let qemu = run(&rig, &table, &scenario, RunPlace::Qemu { image: &image, link: PinLink::Files }).unwrap();
-    let mut states: Vec<State> = qemu.ticks.iter().map(|tick| tick.state).collect();
+    let on_board = run_compared(&rig, &table, &scenario, &mut powered_on(&image, &table)).unwrap().0;
+    let mut states: Vec<State> = on_board.ticks.iter().map(|tick| tick.state).collect();
     states.dedup();
     let [raising, balancing, holding] = [State::Raising, State::Balancing, State::Holding];
     let wanted = [raising, balancing, raising, holding, State::Lowering, State::Calibrated];
-    assert_eq!(states, wanted, "{:?}", qemu.fault);
-    assert!(qemu.ticks == run(&rig, &table, &scenario, RunPlace::Host).unwrap().ticks);
-    // Negative control: the comparison sees another seed.
-    scenario.seed = 8;
-    assert!(run(&rig, &table, &scenario, RunPlace::Host).unwrap().ticks != qemu.ticks);
+    assert_eq!(states, wanted, "{:?}", on_board.fault);
 }
 
 /// State and encoder counts in all telemetry of a rig whose links swing out about positions that are `off` counts from
 /// 0, while homing is requested every 500 ticks.
-fn homed_swinging(table: &TableValues, off: f64, place: RunPlace<'_>) -> Vec<(State, Vec<i32>)> {
-    let run = |target: &mut dyn Target| -> Result<_, RunError> {
+fn homed_swinging(table: &TableValues, off: f64, target: &mut dyn Target) -> Vec<(State, Vec<i32>)> {
+    let run = |target: &mut dyn Target| -> Result<_, HarnessError> {
         let (mut session, mut seen) = (Session::new(target), Vec::new());
         for tick in 0..11_000_u32 {
             let t = f64::from(tick) * f64::from(table.tick_s);
@@ -155,46 +141,27 @@ fn homed_swinging(table: &TableValues, off: f64, place: RunPlace<'_>) -> Vec<(St
         }
         Ok(seen)
     };
-    place.with_target(table, run).unwrap()
+    run(target).unwrap()
 }
 
 #[test]
-fn swinging_links_are_homed_in_qemu_with_the_bits_of_the_host() {
-    let Some(image) = image(ImageKind::InTheLoop) else { return };
-    let (_, table) = quadruple();
-    let host = homed_swinging(&table, 3.4, RunPlace::Host);
-    assert!(homed_swinging(&table, 3.4, RunPlace::Qemu { image: &image, link: PinLink::Files }) == host);
+fn swinging_links_are_homed_on_the_board_with_the_bits_of_the_host() {
+    let (rig, table) = quadruple();
     let homed = |seen: &[(State, Vec<i32>)]| {
         let first = seen.windows(2).find(|pair| pair[1].0 == State::Calibrated)?;
         Some(first[1].1[2] - first[0].1[2])
     };
+    let on_host = |off| with_firmware(&table, |host| homed_swinging(&table, off, host)).unwrap();
+    let host = on_host(3.4);
     // Links 2 to 4 were 3.4 counts off; in between, they move by a count or two.
     assert!(homed(&host).is_some_and(|moved| (-5..=-1).contains(&moved)), "{:?}", homed(&host));
-    // Negative control: the comparison notices other counts.
-    assert!(homed_swinging(&table, 3.6, RunPlace::Host) != host);
-}
-
-/// On the rig with the fewest bytes per second, because QEMU takes long for each byte on these lines: at a load of 20,
-/// 0.3 s of balancing took 10 minutes.
-#[test]
-fn the_image_runs_with_serial_lines_too() {
-    let (rig, table) = rig_and_table("single-quanser-ip02").clone();
-    let Some(image) = in_qemu(built_for(ImageKind::InTheLoopUsart, &rig, &table)) else { return };
-    let (_, scenario) = scenarios(&rig, true).remove(0);
-    let scenario = Scenario { duration_s: 0.05, ..scenario };
-    let qemu = run(&rig, &table, &scenario, RunPlace::Qemu { image: &image, link: PinLink::Usart }).unwrap();
-    assert!(qemu.ticks == run(&rig, &table, &scenario, RunPlace::Host).unwrap().ticks);
-}
-
-#[test]
-fn a_tick_of_the_image_takes_no_more_instructions_than_it_used_to() {
-    let Some(image) = image(ImageKind::InTheLoop) else { return };
-    let (rig, table) = quadruple();
-    let place = RunPlace::Qemu { image: &image, link: PinLink::Files };
-    let (_, scenario) = scenarios(&rig, true).remove(0);
-    let worst = run(&rig, &table, &scenario, place).unwrap().worst_cycles;
-    println!("{worst} instructions in the longest tick");
-    assert!((500..=MOST_INSTRUCTIONS).contains(&worst), "{worst}");
+    // Negative control: other counts are homed otherwise.
+    assert!(on_host(3.6) != host);
+    let Some(image) = image(&rig, &table) else { return };
+    let mut board = powered_on(&image, &table);
+    let on_board =
+        with_firmware(&table, |host| homed_swinging(&table, 3.4, &mut Compared::new(&mut board, host)));
+    assert!(on_board.unwrap().iter().any(|(state, _)| *state == State::Calibrated));
 }
 
 /// Per tick: number, applied force (f32 bits), checksum of all bits that the firmware reports.
@@ -212,7 +179,6 @@ fn golden(recording: &Recording) -> String {
 #[test]
 fn the_runs_are_those_of_the_committed_traces() {
     let (rig, table) = quadruple();
-    let image = image(ImageKind::InTheLoop);
     for (name, scenario) in scenarios(&rig, false) {
         let scenario = Scenario { duration_s: 0.5, ..scenario };
         let path = upright_test_support::repository().join(format!("tests/golden/{name}.csv"));
@@ -222,9 +188,5 @@ fn the_runs_are_those_of_the_committed_traces() {
         }
         let committed = std::fs::read_to_string(&path).unwrap();
         assert!(host == committed, "{} differs on the host", path.display());
-        if let Some(image) = &image {
-            let place = RunPlace::Qemu { image, link: PinLink::Files };
-            assert!(golden(&run(&rig, &table, &scenario, place).unwrap()) == committed, "{name} in QEMU");
-        }
     }
 }

@@ -1,5 +1,4 @@
-//! The control core in closed loop with the nonlinear plant, and the image in QEMU. One program, so that linking
-//! happens once.
+//! The control core in closed loop with the nonlinear plant, and the images. One program, so that linking happens once.
 
 mod absolute_sensors;
 mod acceleration;

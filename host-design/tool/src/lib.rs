@@ -8,7 +8,7 @@
 //! | [`report`] | the HTML page |
 //! | [`image`] | builds firmware images, measures flash, stack and panics |
 //! | [`import`] | rig files from a URDF |
-//! | [`in_the_loop`] | runs the whole firmware, on the host or as an image in QEMU |
+//! | [`in_the_loop`] | runs the whole firmware, on the host or as an image on the virtual board |
 //! | [`campaign`] | fault injection |
 //! | [`commission`] | from a wired rig to a balancing one, step by step |
 //! | [`monitor`] | telemetry and commands in a terminal |

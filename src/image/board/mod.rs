@@ -33,29 +33,16 @@ macro_rules! at_most_one_board {
     };
 }
 
-one_board!("weact-f405" "olimex-h405" "feather-f405" "discovery-f407" "nucleo-f446" "in-the-loop" "in-the-loop-usart");
+one_board!("weact-f405" "olimex-h405" "feather-f405" "discovery-f407" "nucleo-f446");
 
-#[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 mod f4;
 mod handlers;
-#[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-mod in_the_loop;
 
-#[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 use f4::sleep;
-#[cfg(not(any(feature = "in-the-loop", feature = "in-the-loop-usart")))]
 pub(crate) use f4::{
     CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Board as Hardware, MemoryCheck, TICK_US, set_up,
     start_ticks, stop,
 };
-#[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-use in_the_loop::sleep;
-#[cfg(any(feature = "in-the-loop", feature = "in-the-loop-usart"))]
-pub(crate) use in_the_loop::{
-    CLOCK_HZ, ReceivedBytes as Buffer, SimulatedLine as SerialLine, SimulatedPins as Hardware, TICK_US,
-    UncheckedMemory as MemoryCheck, set_up, start_ticks, stop,
-};
-
 pub(crate) use handlers::stop_for_memory;
 
 /// Waits for the next interrupt.

@@ -29,7 +29,14 @@ const fn arm(target: &'static str, name: &'static str, clock_ns: f64) -> Machine
     Machine { target, name, options: &[], is_without_atomics: false, clock_ns }
 }
 
-pub(super) const MACHINES: [Machine; 6] = [
+impl Machine {
+    /// The program that emulates it.
+    pub(super) fn emulator(&self) -> &'static str {
+        if self.name == "virt" { "qemu-system-riscv32" } else { "qemu-system-arm" }
+    }
+}
+
+pub(super) static MACHINES: [Machine; 6] = [
     arm("thumbv6m-none-eabi", "microbit", 62.5),
     arm("thumbv7m-none-eabi", "mps2-an385", 40.0),
     arm("thumbv7em-none-eabihf", "mps2-an386", 40.0),
@@ -71,13 +78,18 @@ pub(super) struct Replayed {
     pub(super) most: f64,
 }
 
-/// The images for all machines. One call of cargo builds those with the same features.
-pub(super) fn images() -> Result<Vec<Image>, BuildError> {
+/// The images for these machines. One call of cargo builds those with the same features.
+pub(super) fn images(machines: &'static [Machine]) -> Result<Vec<Image>, BuildError> {
     let (without_atomics, others): (Vec<_>, Vec<_>) =
-        MACHINES.iter().partition(|machine| machine.is_without_atomics);
-    let target_directory = compile("build", &others, &[])?;
-    compile("build", &without_atomics, &["--features", "single-core"])?;
-    Ok(MACHINES.iter().map(|machine| Image::copied(machine, &target_directory)).collect())
+        machines.iter().partition(|machine| machine.is_without_atomics);
+    let mut images = Vec::new();
+    for (machines, features) in [(others, &[][..]), (without_atomics, &["--features", "single-core"])] {
+        if !machines.is_empty() {
+            let target_directory = compile("build", &machines, features)?;
+            images.extend(machines.iter().map(|machine| Image::copied(machine, &target_directory)));
+        }
+    }
+    Ok(images)
 }
 
 /// Calls cargo; returns the directory into which it builds.
@@ -130,8 +142,7 @@ impl Image {
         let file = |name: &str| folder.path().join(name);
         let input = [&[replay.selection | selection], replay.input.as_slice()].concat();
         std::fs::write(file("replay.in"), input).unwrap();
-        let program = if self.machine.name == "virt" { "qemu-system-riscv32" } else { "qemu-system-arm" };
-        let mut qemu = Command::new(program);
+        let mut qemu = Command::new(self.machine.emulator());
         qemu.args(["-M", self.machine.name, "-nographic", "-monitor", "none", "-serial", "none"]);
         qemu.args(self.machine.options).args(["-icount", "shift=6,sleep=off"]);
         qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(&self.path);

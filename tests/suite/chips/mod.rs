@@ -1,6 +1,7 @@
 //! One set of bits: recorded runs of the firmware are replayed by an image on six instruction sets in QEMU.
 //!
-//! The compiler builds Rust's core library for each of them, so this takes minutes: it runs with `--ignored`.
+//! For other instruction sets than that of the boards, the compiler builds Rust's core library. This takes minutes: it
+//! runs with `--ignored`.
 
 mod image;
 pub(crate) mod recorded;
@@ -14,6 +15,7 @@ use self::recorded::{Replay, runs};
 use crate::equipment::if_possible;
 use upright_test_support::equipment::{is_required, not_exercised};
 use upright_test_support::repository;
+use upright_tool::image::TARGET;
 
 /// The images and the runs, if compiler and emulators are there: for all tests, and the runs are recorded while the
 /// images are compiled.
@@ -22,7 +24,7 @@ fn prepared() -> Option<&'static (Vec<Image>, Vec<Replay>)> {
     let prepare = || {
         std::thread::scope(|scope| {
             let runs = scope.spawn(runs);
-            let images = images_if_possible()?;
+            let images = images_if_possible(&MACHINES)?;
             Some((images, runs.join().unwrap()))
         })
     };
@@ -50,15 +52,15 @@ fn replayed(images: &[Image], runs: &[Replay]) -> Vec<Replayed> {
 }
 
 /// The images, if compiler and emulators are there.
-fn images_if_possible() -> Option<Vec<Image>> {
-    for program in ["qemu-system-arm", "qemu-system-riscv32"] {
+fn images_if_possible(machines: &'static [Machine]) -> Option<Vec<Image>> {
+    for program in machines.iter().map(Machine::emulator) {
         if std::process::Command::new(program).arg("--version").output().is_err() {
-            assert!(!is_required("UPRIGHT_REQUIRE_IMAGE"), "install qemu-system-misc");
-            not_exercised(&format!("other instruction sets: {program} is missing"));
+            assert!(!is_required("UPRIGHT_REQUIRE_IMAGE"), "install {program}");
+            not_exercised(&format!("recorded runs in QEMU: {program} is missing"));
             return None;
         }
     }
-    if_possible(images(), "the replaying image")
+    if_possible(images(machines), "the replaying image")
 }
 
 /// The first tick in which the image gives other bytes than the host; `None` if all are equal.
@@ -76,6 +78,19 @@ struct Instructions {
     target: &'static str,
     mean: f64,
     most: f64,
+}
+
+#[test]
+fn the_instruction_set_of_the_boards_gives_the_bits_of_the_host() {
+    let boards = MACHINES.iter().position(|machine| machine.target == TARGET).unwrap();
+    let Some(images) = images_if_possible(&MACHINES[boards..][..1]) else { return };
+    let runs = runs();
+    for (replay, replayed) in runs.iter().zip(replayed(&images, &runs)) {
+        assert_eq!(first_difference(replay, &replayed), None, "{}: first different tick", replay.name);
+    }
+    // Negative control: another count.
+    let changed = &runs[0].with_another_count();
+    assert!(first_difference(&runs[0], &images[0].replay(changed, 0)).is_some());
 }
 
 #[test]

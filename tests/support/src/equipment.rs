@@ -1,11 +1,9 @@
-//! What some tests need and not every machine has: a compiler for the image, QEMU, a browser, gcc. A test without it
+//! What some tests need and not every machine has: a compiler for the image, a browser, gcc. A test without it
 //! says so and passes; if the environment variable `UPRIGHT_REQUIRE_IMAGE`, `UPRIGHT_REQUIRE_BROWSER` or
 //! `UPRIGHT_REQUIRE_GCC` is set, it fails.
 
 use std::fmt::Debug;
 use std::io::Write;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
 /// Says on stderr what a test leaves out, in spite of the test program, which hides what a passing test prints with the
 /// macros.
@@ -34,21 +32,5 @@ pub fn if_possible<T, E: Debug + ToString>(
             None
         }
         result => Some(result.unwrap()),
-    }
-}
-
-/// The image, if there is one and QEMU is there.
-///
-/// # Panics
-/// Without QEMU where the image is required.
-pub fn in_qemu(image: Option<PathBuf>) -> Option<PathBuf> {
-    let image = image?;
-    match Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).status() {
-        Ok(_) => Some(image),
-        Err(error) if is_required("UPRIGHT_REQUIRE_IMAGE") => panic!("no QEMU: {error}"),
-        Err(_) => {
-            not_exercised("the image in QEMU: install qemu-system-arm");
-            None
-        }
     }
 }

@@ -13,12 +13,10 @@ use super::expected::Ticks::*;
 pub enum Needs {
     /// Nothing: every place that runs the firmware can have it.
     Nothing,
-    /// Pins in memory or in a file: a board's converter never returns NaN.
+    /// Pins in memory: a board's converter never returns NaN.
     SimulatedPins,
-    /// The firmware, or a whole board, in this process.
+    /// A host that can stop reading: not a person's page.
     Process,
-    /// An image of the firmware.
-    Image,
     /// A board.
     Board,
 }
@@ -91,9 +89,9 @@ defects! {
     ArmHanging Nothing "arming while the links hang" => Refused(Inhibits::TILTED);
     ArmStopped Nothing "arming with the emergency stop pressed" => Refused(Inhibits::FAULT.union(Inhibits::EMERGENCY_STOP));
     ArmHeld Nothing "an arm command that is repeated while a fault is cleared" => Refused(Inhibits::HELD);
-    Panic Image "the firmware panics" => Dead;
-    HardFault Image "the firmware accesses memory that does not exist" => Dead;
-    StackOverflow Image "the firmware's stack overflows" => Dead;
+    Panic Board "the firmware panics" => Dead;
+    HardFault Board "the firmware accesses memory that does not exist" => Dead;
+    StackOverflow Board "the firmware's stack overflows" => Dead;
     StalledTick Board "the core is stalled during a tick" => Fault(F::Watchdog, Exactly(3));
     LockUp Board "a processor fault whose handler faults as well" => Fault(F::Watchdog, Exactly(3));
     CrystalStops Board "the crystal stops oscillating" => Fault(F::Clock, Exactly(1));
@@ -200,7 +198,7 @@ mod tests {
     #[test]
     fn a_defect_that_the_simulated_pins_can_have_needs_no_board() {
         let needs_board = Defect::ALL.iter().filter(|defect| defect.needs() == Needs::Board);
-        assert_eq!(needs_board.count(), 17);
+        assert_eq!(needs_board.count(), 20);
         assert_eq!(Defect::EncoderWireOpen.needs(), Needs::Nothing);
     }
 }

@@ -17,14 +17,6 @@ pub enum HarnessError {
     /// The simulated rig cannot be run.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The image in the emulator has stopped in mid-run.
-    #[error("the image has stopped in mid-run (exit status {status}){message}")]
-    Stopped {
-        /// The emulator's exit status; −1 if it was killed.
-        status: i32,
-        /// What the emulator printed, after ": ".
-        message: String,
-    },
     /// The virtual board stopped, saw no tick, or differs from the host; the text completes "the virtual board".
     #[error("the virtual board {0}")]
     Board(String),

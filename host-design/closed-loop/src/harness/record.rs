@@ -40,7 +40,7 @@ pub struct Recording {
     pub ticks: Vec<FirmwareTick>,
     /// The fault that turned the motor off, if there was one.
     pub fault: Option<Fault>,
-    /// Longest execution of a tick: instructions of the image in QEMU; 0 on the host.
+    /// Longest execution of a tick: cycles of the image; 0 on the host.
     pub worst_cycles: u32,
 }
 

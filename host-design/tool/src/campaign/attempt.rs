@@ -162,13 +162,7 @@ impl DefectRun<'_> {
             let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
             let mut is_visible = false;
             if tick > 0 {
-                output = match self.control(harness, &mut injection, since, &mut is_visible) {
-                    Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
-                        observed.dead = true;
-                        return Ok(observed);
-                    }
-                    output => output?,
-                };
+                output = self.control(harness, &mut injection, since, &mut is_visible)?;
             }
             if harness.ask_for(tick, &goals) {
                 // One command in a tick.

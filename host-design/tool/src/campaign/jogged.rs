@@ -34,13 +34,7 @@ impl DefectRun<'_> {
             if turn % self.ticks(KEEP_ALIVE.as_secs_f64()) == 0 && injection.host_is_alive(since) {
                 harness.session.send(Request::Jog { along: trial.sign > 0.0 });
             }
-            let output = match self.control(harness, &mut injection, since, &mut false) {
-                Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
-                    observed.dead = true;
-                    return Ok(observed);
-                }
-                output => output?,
-            };
+            let output = self.control(harness, &mut injection, since, &mut false)?;
             if since == Some(0) {
                 injection.serial(&mut harness.session);
             }

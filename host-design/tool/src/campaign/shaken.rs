@@ -71,14 +71,7 @@ impl DefectRun<'_> {
                 shaken.harness.bench.spoil(defect);
             }
             shaken.harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
-            let acted = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive));
-            let output = match acted {
-                Err(HarnessError::Stopped { .. }) if observed.off.is_some() => {
-                    observed.dead = true;
-                    return Ok(observed);
-                }
-                output => output?,
-            };
+            let output = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive))?;
             // A drive with pulses also holds the cart and brings it to rest, which does not count.
             let state = shaken.harness.session.status().state;
             let is_shaken = self.table.steps.is_none() || state == State::Identifying;

@@ -96,8 +96,7 @@ pub fn kinds(table: &TableValues, place: RunPlace<'_>) -> Vec<Defect> {
         .copied()
         .filter(|kind| kind.is_possible(table))
         .filter(|kind| match place {
-            RunPlace::Host => !matches!(kind.needs(), Needs::Image | Needs::Board),
-            RunPlace::Qemu { .. } => !matches!(kind.needs(), Needs::Process | Needs::Board),
+            RunPlace::Host => kind.needs() != Needs::Board,
             RunPlace::Board { .. } => kind.needs() != Needs::SimulatedPins,
         })
         .collect()

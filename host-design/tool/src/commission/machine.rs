@@ -8,7 +8,7 @@ use upright_design::table::WriteError;
 
 use super::step::CommissionStep;
 use super::task::PersonTask;
-use crate::in_the_loop::{EmulatorError, RunError};
+use crate::in_the_loop::RunError;
 
 /// A rig with its firmware at the other end of a line, and the person beside it.
 pub trait MachineAtHand {
@@ -56,12 +56,6 @@ pub enum Stop {
 
 impl From<HarnessError> for Stop {
     fn from(error: HarnessError) -> Self {
-        RunError::from(error).into()
-    }
-}
-
-impl From<EmulatorError> for Stop {
-    fn from(error: EmulatorError) -> Self {
         RunError::from(error).into()
     }
 }

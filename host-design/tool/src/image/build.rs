@@ -18,58 +18,26 @@ use upright_design::table::{TableValues, gains_source, write_atomically};
 /// The cargo profile that images are compiled with.
 pub const PROFILE: &str = "firmware";
 
-/// Kind of an image: what it is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ImageKind {
-    /// For a board.
-    Board(BoardName),
-    /// For QEMU, with the pins connected through files.
-    InTheLoop,
-    /// For QEMU, with the pins connected through a serial line.
-    InTheLoopUsart,
-}
-
-impl ImageKind {
-    /// The cargo feature that selects it, and the beginning of the image's file name.
-    fn name(self) -> &'static str {
-        match self {
-            ImageKind::Board(board) => board.name(),
-            ImageKind::InTheLoop => "in-the-loop",
-            ImageKind::InTheLoopUsart => "in-the-loop-usart",
-        }
-    }
-
-    /// The board that it is for; `None` for QEMU.
-    fn board(self) -> Option<BoardName> {
-        match self {
-            ImageKind::Board(board) => Some(board),
-            ImageKind::InTheLoop | ImageKind::InTheLoopUsart => None,
-        }
-    }
-}
-
 /// Builds the image with the committed gain table, `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors
 /// [`BuildError`] if the board cannot serve the table's rig, there is no compiler, or it fails.
-pub fn build(kind: ImageKind) -> Result<PathBuf, BuildError> {
-    check_board(kind, SENSORS, f64::from(TICK_S), TABLE.steps.as_ref())?;
-    compile(kind, None, kind.name())
+pub fn build(board: BoardName) -> Result<PathBuf, BuildError> {
+    check_board(board, SENSORS, f64::from(TICK_S), TABLE.steps.as_ref())?;
+    compile(board, None, board.name())
 }
 
 /// Builds the image with the table of `rig` in place of `src/gains.rs`; returns the path of the ELF file.
 ///
 /// # Errors
 /// As for [`build`].
-pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
-    check_board(kind, table.sensors(), rig.tick.period_s, table.steps.as_ref())?;
-    if let Some(board) = kind.board() {
-        reads_all(board, table)?;
-    }
+pub fn build_for(board: BoardName, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
+    check_board(board, table.sensors(), rig.tick.period_s, table.steps.as_ref())?;
+    reads_all(board, table)?;
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.
     let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
-    let mut name = format!("{}-{:016x}-{:08x}", kind.name(), rig.hash(), table.crc());
+    let mut name = format!("{}-{:016x}-{:08x}", board.name(), rig.hash(), table.crc());
     if let Some(crc) = table.swing_up_crc() {
         name += &format!("-{crc:08x}");
     }
@@ -78,25 +46,24 @@ pub fn build_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Result<Path
     if std::fs::read_to_string(&gains).ok().as_deref() != Some(&included) {
         write_atomically(&gains, included.as_bytes())?;
     }
-    compile(kind, Some(&gains), &name)
+    compile(board, Some(&gains), &name)
 }
 
 /// Checks what the board of the image can do for this rig, as far as that is known before it is designed.
 ///
 /// # Errors
 /// [`BuildError`] if the board counts too few encoders, or cannot make the tick.
-pub fn check_rig(kind: ImageKind, rig: &Rig) -> Result<(), BuildError> {
-    check_board(kind, rig.sensors().len(), rig.tick.period_s, None)
+pub fn check_rig(board: BoardName, rig: &Rig) -> Result<(), BuildError> {
+    check_board(board, rig.sensors().len(), rig.tick.period_s, None)
 }
 
 /// Checks what the board of the image can do before the compiler is started, whose errors name lines of the image.
 fn check_board(
-    kind: ImageKind,
+    board: BoardName,
     needed: usize,
     tick_s: f64,
     steps: Option<&StepMap>,
 ) -> Result<(), BuildError> {
-    let Some(board) = kind.board() else { return Ok(()) };
     if needed > board.encoders() {
         return Err(BuildError::Encoders { board, needed });
     }
@@ -145,25 +112,23 @@ pub(super) fn one_at_a_time() -> Result<File, BuildError> {
     locked.map_err(|source| BuildError::File { path, source })
 }
 
-fn compile(kind: ImageKind, gains: Option<&Path>, name: &str) -> Result<PathBuf, BuildError> {
+fn compile(board: BoardName, gains: Option<&Path>, name: &str) -> Result<PathBuf, BuildError> {
     let root = checkout()?;
     let _others_wait = one_at_a_time()?;
     let Compiler { program, version, mut cargo, target_directory } = compiler()?;
     let features = match gains {
         Some(gains) => {
             cargo.env("UPRIGHT_GAINS", gains);
-            format!("{},gains-from-env", kind.name())
+            format!("{},gains-from-env", board.name())
         }
-        None => kind.name().to_owned(),
+        None => board.name().to_owned(),
     };
     cargo
         .current_dir(&root)
         .args(["rustc", "--quiet", "--package", "upright", "--bin", "upright-image"])
         .args(["--profile", PROFILE, "--target", TARGET, "--features", &features]);
-    if kind.board().is_some() {
-        // Only the image's own crate is optimised for size: the library holds the part of a tick that has to be fast.
-        cargo.args(["--", "-C", "opt-level=s"]);
-    }
+    // Only the image's own crate is optimised for size: the library holds the part of a tick that has to be fast.
+    cargo.args(["--", "-C", "opt-level=s"]);
     let image = images()?.join(format!("{name}.elf"));
     if kept::is_current(&image, &cargo, &version) {
         return Ok(image);
@@ -199,7 +164,7 @@ mod tests {
 
     #[test]
     fn what_the_board_cannot_do_is_refused_before_the_compiler_is_started() {
-        let feather = ImageKind::Board(BoardName::FeatherF405);
+        let feather = BoardName::FeatherF405;
         for tick_s in [0.05, 1.1e-4] {
             let refused = check_board(feather, 2, tick_s, None).unwrap_err().to_string();
             let tick = format!("0.12 to 33 ms, and this rig's is {} ms", tick_s * 1e3);
@@ -216,6 +181,5 @@ mod tests {
         let too_many = refused(1e-2, 1.3);
         assert!(too_many.contains("25500 step pulses") && too_many.contains("26000"), "{too_many}");
         assert!(refused(1e-3, 10.5).contains("200000 step pulses"), "{}", refused(1e-3, 10.5));
-        assert!(check_board(ImageKind::InTheLoop, 5, 0.05, None).is_ok());
     }
 }

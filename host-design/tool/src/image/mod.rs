@@ -24,7 +24,7 @@ mod stack;
 mod uf2;
 
 pub use board::{BoardName, NoBoard};
-pub use build::{ImageKind, PROFILE, build, build_for, check_rig};
+pub use build::{PROFILE, build, build_for, check_rig};
 pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler, compiler_for_chips};
 pub(crate) use compiler::{ForeignTarget, compiler_for};

@@ -1,5 +1,5 @@
-//! Where the whole firmware runs in closed loop with the simulated rig: on the host in this process, as an image in
-//! QEMU, or as the image that is flashed, on the virtual board. The loop itself is [`upright_closed_loop::harness`].
+//! Where the whole firmware runs in closed loop with the simulated rig: on the host in this process, or as the image
+//! that is flashed, on the virtual board. The loop itself is [`upright_closed_loop::harness`].
 //!
 //! ```
 //! use upright::table::Law;
@@ -19,7 +19,6 @@
 mod board;
 mod error;
 mod place;
-mod qemu;
 mod relay;
 
 pub use board::{
@@ -27,5 +26,4 @@ pub use board::{
 };
 pub use error::RunError;
 pub use place::{RunPlace, run, run_compared, run_shaken};
-pub use qemu::{Emulator, EmulatorError, PinLink};
 pub use relay::serve;

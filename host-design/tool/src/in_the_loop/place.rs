@@ -1,7 +1,5 @@
 //! Where the firmware runs, and how it is started there.
 
-use std::path::Path;
-
 use upright_board::Conditions;
 use upright_closed_loop::harness::{HarnessError, Recording, Target, record, with_firmware};
 use upright_design::rig::Rig;
@@ -11,20 +9,12 @@ use upright_identify::{Log, shake_with};
 
 use super::board::{Compared, VirtualBoard};
 use super::error::RunError;
-use super::qemu::{Emulator, EmulatorError, PinLink};
 
 /// Where the firmware runs.
 #[derive(Debug, Clone, Copy)]
 pub enum RunPlace<'a> {
     /// In this process.
     Host,
-    /// As an image in QEMU.
-    Qemu {
-        /// The ELF file.
-        image: &'a Path,
-        /// How its pins are connected.
-        link: PinLink,
-    },
     /// As the image that is flashed, on the virtual board.
     Board {
         /// The image.
@@ -39,7 +29,6 @@ impl RunPlace<'_> {
     pub fn name(self) -> &'static str {
         match self {
             RunPlace::Host => "this computer",
-            RunPlace::Qemu { .. } => "QEMU",
             RunPlace::Board { .. } => "the virtual board",
         }
     }
@@ -54,11 +43,10 @@ impl RunPlace<'_> {
         action: impl FnOnce(&mut dyn Target) -> Result<R, E>,
     ) -> Result<R, E>
     where
-        E: From<HarnessError> + From<EmulatorError>,
+        E: From<HarnessError>,
     {
         match self {
             RunPlace::Host => with_firmware(table, action)?,
-            RunPlace::Qemu { image, link } => action(&mut Emulator::start(image, link)?),
             RunPlace::Board { image, conditions } => {
                 action(&mut VirtualBoard::start(image, &conditions, table)?)
             }

@@ -10,7 +10,7 @@ use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_plan::{Stored, hangs, refined, up_and_down, with_motions};
-use upright_tool::image::{BoardName, ImageKind, build_for};
+use upright_tool::image::{BoardName, build_for};
 use upright_tool::in_the_loop::{Event, VirtualBoard, measure, run_compared};
 use upright_trust::verify::at_rest_disturbed;
 
@@ -45,7 +45,7 @@ fn potentiometer(noise_rad: f64) -> (Rig, TableValues) {
 }
 
 fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
-    let elf = built_for(ImageKind::Board(BoardName::WeactF405), rig, table)?;
+    let elf = built_for(BoardName::WeactF405, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
@@ -239,7 +239,7 @@ fn defects_of(sensor: usize, rig: &(Rig, TableValues), image: &Image) {
 fn an_image_is_refused_for_a_board_or_a_sensor_that_do_not_fit() {
     let refused = |board, bits| {
         let (rig, table) = absolute("single-quanser-ip02", bits, 1e-3);
-        build_for(ImageKind::Board(board), &rig, &table).unwrap_err().to_string()
+        build_for(board, &rig, &table).unwrap_err().to_string()
     };
     let bits = refused(BoardName::WeactF405, 12);
     assert!(bits.contains("link 1") && bits.contains("14 bits") && bits.contains("own-board.md"), "{bits}");
@@ -248,7 +248,7 @@ fn an_image_is_refused_for_a_board_or_a_sensor_that_do_not_fit() {
         LinkEncoder::Absolute { bits: 14, travel_rad: Some(5.934), zero_counts: 10_400, noise_rad: 1e-3 };
     rig.chain_mut().unwrap().links[0].encoder = Some(encoder);
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    let of_14 = build_for(ImageKind::Board(BoardName::WeactF405), &rig, &table).unwrap_err().to_string();
+    let of_14 = build_for(BoardName::WeactF405, &rig, &table).unwrap_err().to_string();
     assert!(of_14.contains("one potentiometer, with 12 bits, at link 1"), "{of_14}");
     let feather = refused(BoardName::FeatherF405, 14);
     assert!(feather.contains("link 1") && feather.contains("another board"), "{feather}");

@@ -9,7 +9,7 @@ use upright::supervision::supervisor::State;
 use upright_board::{
     Chip, Conditions, Crystal, ExternalLevel, Image, Input, Rules, SimulatedBoard, pin, seconds,
 };
-use upright_tool::image::{BoardName, ImageKind, flash_checksum};
+use upright_tool::image::{BoardName, flash_checksum};
 use upright_tool::monitor::Monitor;
 
 use crate::equipment::built;
@@ -249,7 +249,7 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
         (BoardName::DiscoveryF407, pin('D', 12), false),
         (BoardName::NucleoF446, pin('A', 5), false),
     ] {
-        let Some(elf) = built(ImageKind::Board(board)) else { return };
+        let Some(elf) = built(board) else { return };
         let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
         let started = |conditions: &Conditions| {
             let mut run = Powered::strict(&image, conditions);

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_tool::image::{BuildError, ImageKind, build, build_for};
+use upright_tool::image::{BoardName, BuildError, build, build_for};
 
-pub(crate) use upright_test_support::equipment::{in_qemu, is_required, not_exercised};
+pub(crate) use upright_test_support::equipment::{is_required, not_exercised};
 
 /// What was built or found; `None` if it needs the missing compiler for the image. `what` it is for.
 pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Option<T> {
@@ -15,11 +15,11 @@ pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Optio
 }
 
 /// The image with the committed gain table.
-pub(crate) fn built(kind: ImageKind) -> Option<PathBuf> {
-    if_possible(build(kind), "an image")
+pub(crate) fn built(board: BoardName) -> Option<PathBuf> {
+    if_possible(build(board), "an image")
 }
 
 /// The image with this table.
-pub(crate) fn built_for(kind: ImageKind, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
-    if_possible(build_for(kind, rig, table), "an image")
+pub(crate) fn built_for(board: BoardName, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
+    if_possible(build_for(board, rig, table), "an image")
 }

@@ -15,7 +15,7 @@ use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_closed_loop::harness::{Pins, Session};
 use upright_design::simulate::{Bench, Scenario};
-use upright_tool::image::{BoardName, ImageKind, flash_checksum};
+use upright_tool::image::{BoardName, flash_checksum};
 use upright_tool::in_the_loop::VirtualBoard;
 use upright_tool::monitor::{Monitor, action, view};
 
@@ -246,7 +246,7 @@ fn first_balance(person: &mut Person<'_>) {
 
 #[test]
 fn the_guide_can_be_followed_step_by_step() {
-    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
+    let Some(elf) = built(BoardName::WeactF405) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();

@@ -1,5 +1,4 @@
-//! Inspection of images: defects of an image are found. The image for the emulator is not fit for a board: it can be
-//! told to panic and to overflow its stack.
+//! Inspection of images: defects of an image are found, in `tests/fixtures/unfit_image.rs`.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -11,15 +10,40 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use upright_test_support::limits::{joined, output, received};
 use upright_tool::image::{
-    ImageKind, LinkedImage, StackError, forbidden_functions, forbidden_in_handlers, size, stack_bound,
+    BoardName, BuildError, Compiler, LinkedImage, PROFILE, StackError, TARGET, compiler, forbidden_functions,
+    forbidden_in_handlers, size, stack_bound,
 };
 
-use crate::equipment::built;
+use crate::equipment::{built, if_possible};
 
-/// Path of the image for the emulator; `None` without a compiler for it.
-fn path_in_the_loop() -> Option<&'static Path> {
+/// Path of the flashed image; `None` without a compiler for it.
+fn flashed() -> Option<&'static Path> {
     static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PATH.get_or_init(|| built(ImageKind::InTheLoop)).as_deref()
+    PATH.get_or_init(|| built(BoardName::WeactF405)).as_deref()
+}
+
+/// Path of an image that must not be flashed; `None` without a compiler for it.
+fn unfit() -> Option<&'static Path> {
+    static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PATH.get_or_init(|| if_possible(built_unfit(), "an image")).as_deref()
+}
+
+fn built_unfit() -> Result<PathBuf, BuildError> {
+    let Compiler { mut cargo, target_directory, .. } = compiler()?;
+    cargo.current_dir(upright_test_support::repository());
+    cargo.args([
+        "build",
+        "--quiet",
+        "--package",
+        "upright",
+        "--bin",
+        "unfit-image",
+        "--features",
+        "weact-f405",
+    ]);
+    let compiled = output(cargo.args(["--profile", PROFILE, "--target", TARGET]));
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    Ok(target_directory.join(TARGET).join(PROFILE).join("unfit-image"))
 }
 
 fn upright(arguments: &[&str]) -> Output {
@@ -35,15 +59,15 @@ fn upright_alone(arguments: &[&str]) -> Output {
 /// The compiler writes every image to the same file, and other processes compile, too.
 #[test]
 fn an_image_waits_for_the_one_that_is_being_compiled() {
-    let Some(path) = path_in_the_loop() else { return };
+    let Some(path) = flashed() else { return };
     // Several times as long as for an image that does not wait and has been compiled before.
     let begin = Instant::now();
-    built(ImageKind::InTheLoop);
+    built(BoardName::WeactF405);
     let patience = (4 * begin.elapsed()).min(Duration::from_secs(3));
     let other = File::create(path.with_file_name("compiling")).unwrap();
     other.lock().unwrap();
     let (done, is_done) = mpsc::channel();
-    let builder = std::thread::spawn(move || done.send(built(ImageKind::InTheLoop)).unwrap());
+    let builder = std::thread::spawn(move || done.send(built(BoardName::WeactF405)).unwrap());
     assert_eq!(is_done.recv_timeout(patience), Err(RecvTimeoutError::Timeout));
     other.unlock().unwrap();
     assert_eq!(received(&is_done, "the image").as_deref(), Some(path));
@@ -52,7 +76,7 @@ fn an_image_waits_for_the_one_that_is_being_compiled() {
 
 #[test]
 fn a_panic_is_found() {
-    let Some(path) = path_in_the_loop() else { return };
+    let Some(path) = unfit() else { return };
     let image = LinkedImage::read(path).unwrap();
     let found = forbidden_functions(&image);
     assert!(found.contains(&"core::panicking::panic_fmt"), "{found:?}");
@@ -61,7 +85,7 @@ fn a_panic_is_found() {
 /// On a Pico, only what interrupts reach has to be free of panics. Its images, which CI measures, have none there.
 #[test]
 fn a_panic_in_an_interrupt_is_found() {
-    let Some(path) = path_in_the_loop() else { return };
+    let Some(path) = unfit() else { return };
     let image = LinkedImage::read(path).unwrap();
     let found = forbidden_in_handlers(&image).unwrap();
     assert!(found.contains(&"core::panicking::panic_fmt"), "{found:?}");
@@ -69,7 +93,7 @@ fn a_panic_in_an_interrupt_is_found() {
 
 #[test]
 fn a_recursion_has_no_bound_on_the_stack() {
-    let Some(path) = path_in_the_loop() else { return };
+    let Some(path) = unfit() else { return };
     let image = LinkedImage::read(path).unwrap();
     match stack_bound(&image) {
         Err(StackError::Recursion(name)) => assert!(name.ends_with("::dig"), "{name}"),
@@ -79,7 +103,7 @@ fn a_recursion_has_no_bound_on_the_stack() {
 
 #[test]
 fn each_byte_is_counted_once() {
-    let Some(path) = path_in_the_loop() else { return };
+    let Some(path) = flashed() else { return };
     let image = LinkedImage::read(path).unwrap();
     let size = size(&image).unwrap();
     let sum = |parts: &[upright_tool::image::ImagePart]| {
@@ -93,7 +117,7 @@ fn each_byte_is_counted_once() {
 
 #[test]
 fn an_image_that_must_not_ship_ends_with_status_1_after_its_figures() {
-    let Some(path) = path_in_the_loop() else { return };
+    let Some(path) = unfit() else { return };
     let output = upright(&["firmware", "size", "--json", "--elf", path.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(1));
     let figures: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -105,7 +129,7 @@ fn an_image_that_must_not_ship_ends_with_status_1_after_its_figures() {
 fn a_file_that_is_no_image_is_bad_input() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("image.elf");
-    let Some(whole) = path_in_the_loop() else { return };
+    let Some(whole) = flashed() else { return };
     let whole = std::fs::read(whole).unwrap();
     for bytes in [&b""[..], b"not an image", &whole[..60], &whole[..whole.len() / 2]] {
         std::fs::write(&path, bytes).unwrap();

@@ -1,5 +1,4 @@
-//! The jog in closed loop with the simulated rig: on the host, as the image in QEMU, and as the flashed image
-//! on the virtual board.
+//! The jog in closed loop with the simulated rig: on the host, and as the flashed image on the virtual board.
 
 use std::path::Path;
 
@@ -12,14 +11,14 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_board::{Conditions, Image};
+use upright_board::Image;
 use upright_closed_loop::client::AnyTelemetry;
-use upright_closed_loop::harness::Harness;
+use upright_closed_loop::harness::{Harness, HarnessError, Target, with_firmware};
 use upright_design::simulate::Scenario;
-use upright_tool::image::{BoardName, ImageKind};
-use upright_tool::in_the_loop::{PinLink, RunError, RunPlace};
+use upright_tool::image::BoardName;
+use upright_tool::in_the_loop::{Compared, VirtualBoard};
 
-use crate::equipment::{built, in_qemu};
+use crate::equipment::built;
 use crate::published::rig_and_table;
 
 const ALONG: Request = Request::Jog { along: true };
@@ -132,30 +131,35 @@ impl Person<'_, '_> {
 }
 
 /// Runs `test` on a rig that is homed, with signs checked and links hanging. Returns all telemetry.
-fn at_the_bench(place: RunPlace<'_>, test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
+fn at_the_bench(test: impl FnOnce(&mut Person<'_, '_>)) -> Vec<AnyTelemetry> {
+    with_firmware(&rig_and_table("quadruple-paper").1, |host| bench_of(host, test).unwrap()).unwrap()
+}
+
+/// The same where the firmware is `target`.
+fn bench_of(
+    target: &mut dyn Target,
+    test: impl FnOnce(&mut Person<'_, '_>),
+) -> Result<Vec<AnyTelemetry>, HarnessError> {
     let (rig, table) = rig_and_table("quadruple-paper");
     let scenario = Scenario::at_rest(rig, Law::Lqr);
-    let run = place.with_target(table, |target| -> Result<_, RunError> {
-        let mut harness = Harness::new(rig, table, &scenario, target)?;
-        for tick in 0.. {
-            harness.by_hand(tick)?;
-            if harness.session.status().signs == Signs::Checked {
-                break;
-            }
+    let mut harness = Harness::new(rig, table, &scenario, target)?;
+    for tick in 0.. {
+        harness.by_hand(tick)?;
+        if harness.session.status().signs == Signs::Checked {
+            break;
         }
-        let hanging = harness.bench.state().to_vec();
-        let mut person = Person {
-            harness: &mut harness,
-            machine: Machine::Still,
-            contacts: Contacts::default(),
-            hanging,
-            telemetry: Vec::new(),
-        };
-        assert_eq!(person.settle(), (State::Calibrated, MotorSign::Unchecked, None));
-        test(&mut person);
-        Ok(person.telemetry)
-    });
-    run.unwrap()
+    }
+    let hanging = harness.bench.state().to_vec();
+    let mut person = Person {
+        harness: &mut harness,
+        machine: Machine::Still,
+        contacts: Contacts::default(),
+        hanging,
+        telemetry: Vec::new(),
+    };
+    assert_eq!(person.settle(), (State::Calibrated, MotorSign::Unchecked, None));
+    test(&mut person);
+    Ok(person.telemetry)
 }
 
 /// Every property of the jog, one after the other.
@@ -201,7 +205,7 @@ fn whole_check(person: &mut Person<'_, '_>) {
 
 #[test]
 fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
-    let telemetry = at_the_bench(RunPlace::Host, whole_check);
+    let telemetry = at_the_bench(whole_check);
     let driving = telemetry.iter().filter(|telemetry| telemetry.state == State::Jogging);
     // Never with more than a tenth of the force limit of 20 N, and up to it.
     let most = driving.map(|telemetry| telemetry.applied_n.abs()).fold(0.0, f32::max);
@@ -209,24 +213,22 @@ fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
 }
 
 #[test]
-fn the_image_in_qemu_does_it_with_the_bits_of_the_host() {
-    let Some(image) = in_qemu(built(ImageKind::InTheLoop)) else { return };
-    let host = at_the_bench(RunPlace::Host, whole_check);
-    let qemu = at_the_bench(RunPlace::Qemu { image: &image, link: PinLink::Files }, whole_check);
-    assert!(host == qemu);
-    // Negative control: the comparison sees a key that is pressed once more.
-    let once_more = at_the_bench(RunPlace::Host, |person| {
-        whole_check(person);
-        person.push(ALONG, 1);
-    });
-    assert!(once_more[..host.len()] == host && once_more.len() > host.len());
-}
-
-#[test]
-fn the_flashed_image_does_it_on_the_virtual_board() {
-    let Some(elf) = built(ImageKind::Board(BoardName::WeactF405)) else { return };
+fn the_flashed_image_does_it_with_the_bits_of_the_host() {
+    let Some(elf) = built(BoardName::WeactF405) else { return };
     let image = Image::from_elf(&std::fs::read(Path::new(&elf)).unwrap()).unwrap();
-    at_the_bench(RunPlace::Board { image: &image, conditions: Conditions::f405(1) }, whole_check);
+    let (_, table) = rig_and_table("quadruple-paper");
+    let mut board = VirtualBoard::start(&image, &BoardName::WeactF405.conditions(1), table).unwrap();
+    with_firmware(table, |host| {
+        let mut compared = Compared::new(&mut board, host);
+        bench_of(&mut compared, whole_check).unwrap();
+        assert!(
+            compared.ticks > 1_000 && compared.messages > 100,
+            "{} {}",
+            compared.ticks,
+            compared.messages
+        );
+    })
+    .unwrap();
 }
 
 #[test]
@@ -240,7 +242,7 @@ fn every_contact_ends_it_at_once() {
         (|contacts| contacts.clock_fault = true, Fault::Clock),
         (|contacts| contacts.board_fault = true, Fault::Board),
     ];
-    at_the_bench(RunPlace::Host, |person| {
+    at_the_bench(|person| {
         for (open, fault) in cases {
             person.tick(Some(ALONG));
             person.wait(30);
@@ -264,7 +266,7 @@ fn every_contact_ends_it_at_once() {
 
 #[test]
 fn it_is_refused_when_links_swing_and_at_an_end_of_the_rail() {
-    at_the_bench(RunPlace::Host, |person| {
+    at_the_bench(|person| {
         let place = |person: &mut Person<'_, '_>, index: usize, position: f64| {
             let mut state = person.hanging.clone();
             state[index] = position;

@@ -8,7 +8,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright_board::{Conditions, Image, Input};
 use upright_closed_loop::conversation::words;
-use upright_tool::image::{BoardName, ImageKind};
+use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::RULES;
 
 use crate::equipment::built_for;
@@ -72,7 +72,7 @@ fn the_record_of_the_crash_names_the_word_that_has_changed() {
 /// The image with stored motions, which are half of it.
 fn image_with_motions() -> Option<Image> {
     let (rig, table) = rig_and_table_with_motions("quadruple-paper");
-    let elf = built_for(ImageKind::Board(BoardName::WeactF405), rig, table)?;
+    let elf = built_for(BoardName::WeactF405, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 

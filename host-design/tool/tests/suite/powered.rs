@@ -7,7 +7,7 @@ use upright::protocol::message::{Command, Message, Reply, Request, Telemetry};
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright_board::{Conditions, ExternalLevel, Image, Input, Rules, SimulatedBoard, seconds};
-use upright_tool::image::{BoardName, ImageKind};
+use upright_tool::image::BoardName;
 
 use crate::equipment::built;
 
@@ -15,7 +15,7 @@ pub(crate) const BAUD: u32 = 460_800;
 
 /// The image; none without a compiler.
 pub(crate) fn image() -> Option<Image> {
-    let elf = built(ImageKind::Board(BoardName::WeactF405))?;
+    let elf = built(BoardName::WeactF405)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 

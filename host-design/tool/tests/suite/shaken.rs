@@ -1,6 +1,6 @@
-//! The firmware shakes the simulated machine, and its log is identified: on the host, and as the image in QEMU.
+//! The firmware shakes the simulated machine, and its log is identified: on the host, and as the image that is flashed.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -10,6 +10,7 @@ use upright::protocol::tick_log::OFF;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
+use upright_board::Image;
 use upright_closed_loop::harness::{Harness, HarnessError, Pins, Target, with_firmware};
 use upright_design::design::design;
 use upright_design::plant::ChainParameters;
@@ -19,12 +20,12 @@ use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_identify::{
     Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakeError, Shaken, checked_and_hanging,
-    identify,
+    identify, shake_with,
 };
-use upright_tool::image::ImageKind;
-use upright_tool::in_the_loop::{PinLink, RunPlace, run_shaken};
+use upright_tool::image::BoardName;
+use upright_tool::in_the_loop::{Compared, RunPlace, VirtualBoard, run_shaken};
 
-use crate::equipment::{built_for, in_qemu};
+use crate::equipment::built_for;
 use crate::published::{first_hour, rig, rig_and_table, rig_and_table_with_motions};
 
 const REALITY: &str = "[reality]\njoint_friction_n_m = [1.5e-3, 1e-3]\ncart_friction_n = 0.2\n\
@@ -79,15 +80,19 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 }
 
 #[test]
-fn the_image_in_qemu_logs_the_ticks_of_the_host() {
-    // With its motions, so that this test and the swing-up in QEMU share one image.
+fn the_flashed_image_is_shaken_with_the_bits_of_the_host() {
+    // With its motions, so that this test and others share one image.
     let (machine, table) = rig_and_table_with_motions("single-quanser-ip02").clone();
-    let Some(image) = in_qemu(built_for(ImageKind::InTheLoop, &machine, &table)) else { return };
-    let log = |seed: u64, place: RunPlace<'_>| run_shaken(&machine, &table, 3.0, seed, place).unwrap();
-    let qemu = log(1, RunPlace::Qemu { image: Path::new(&image), link: PinLink::Files });
-    assert!(qemu.ticks().len() > 2_000 && qemu == log(1, RunPlace::Host));
-    // Negative control: other phases give another log.
-    assert!(qemu != log(2, RunPlace::Host));
+    let Some(elf) = built_for(BoardName::WeactF405, &machine, &table) else { return };
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let mut board = VirtualBoard::start(&image, &BoardName::WeactF405.conditions(1), &table).unwrap();
+    let log = with_firmware(&table, |host| {
+        shake_with(&machine, &table, &mut Compared::new(&mut board, host), 3.0, 1).unwrap()
+    });
+    assert!(log.unwrap().ticks().len() > 2_000);
+    // Other phases give another log.
+    let log = |seed| run_shaken(&machine, &table, 3.0, seed, RunPlace::Host).unwrap();
+    assert!(log(1) == log(1) && log(1) != log(2));
 }
 
 /// A defect of the inputs: changes what the firmware reads, given its inputs before the defect and the ticks since

@@ -17,10 +17,10 @@ use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_plan::{hangs, up_and_down};
 use upright_tool::campaign::{Class, Defect, During, Setup, campaign, kinds, one};
-use upright_tool::image::{BoardName, ImageKind};
-use upright_tool::in_the_loop::{Event, PinLink, RunError, RunPlace, VirtualBoard, run, run_compared};
+use upright_tool::image::BoardName;
+use upright_tool::in_the_loop::{Event, RunError, RunPlace, VirtualBoard, run_compared};
 
-use crate::equipment::{built_for, in_qemu};
+use crate::equipment::built_for;
 use crate::published::{rig_and_table, rig_and_table_with_motions};
 
 /// What a driver needs: of a pulse, before one, and after a change of direction.
@@ -84,7 +84,7 @@ fn are_even(due: Time, tick: Time, pulses: &[Pulse]) -> bool {
 }
 
 fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
-    let elf = built_for(ImageKind::Board(BoardName::WeactF405), rig, table)?;
+    let elf = built_for(BoardName::WeactF405, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
@@ -198,20 +198,6 @@ fn a_stepper_raises_and_lowers_its_links_with_the_pulses_of_the_host() {
     assert!(hangs(&recording), "{:?}", recording.fault);
     let counted = log.borrow();
     assert!(counted.wrong.is_none() && counted.pulses > 1_000, "{:?} {}", counted.wrong, counted.pulses);
-}
-
-#[test]
-fn a_stepper_in_qemu_has_the_bits_of_the_host() {
-    for name in ["single-stepper", "quadruple-stepper"] {
-        let (rig, table) = rig_and_table(name);
-        let Some(image) = in_qemu(built_for(ImageKind::InTheLoop, rig, table)) else { return };
-        let place = RunPlace::Qemu { image: &image, link: PinLink::Files };
-        let scenario = Scenario { torque_noise_n_m: 1e-5, ..moving(rig, 100.0 * rig.tick.period_s) };
-        let qemu = run(rig, table, &scenario, place).unwrap();
-        assert!(qemu.ticks == run(rig, table, &scenario, RunPlace::Host).unwrap().ticks, "{name}");
-        let other = Scenario { seed: 8, ..scenario };
-        assert!(qemu.ticks != run(rig, table, &other, RunPlace::Host).unwrap().ticks, "{name}");
-    }
 }
 
 /// The number of pulses of each tick of a run in which the core stalls from a time in the next tick on, once the cart

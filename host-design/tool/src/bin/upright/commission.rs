@@ -14,7 +14,6 @@ use upright_tool::commission::{
     AtPort, CommissionPlan, CommissionRecord, CommissionStep, Commissioning, Journal, Planted, Simulated,
     measured_zeros,
 };
-use upright_tool::in_the_loop::PinLink;
 use upright_tool::monitor::SerialLine;
 
 use crate::failure::Failure;
@@ -33,7 +32,7 @@ use crate::variation::with_table;
 Examples:
   upright commission rigs/single-quanser-ip02.toml --target host --write as-it-is.toml
   upright commission rigs/double-quanser-dbpen.toml --target host --defect encoders-swapped    exit status 3
-  upright commission my.toml --target qemu --machine as-it-is.toml --record record.json
+  upright commission my.toml --target board --machine as-it-is.toml --record record.json
   upright commission my.toml --port /dev/ttyACM0 --write as-it-is.toml --record record.json    the real machine
   upright commission my.toml --port /dev/ttyACM0 --zeros --write my.toml     only the zeros of absolute sensors")]
 pub(crate) struct CommissionCommand {
@@ -103,7 +102,7 @@ impl CommissionCommand {
             (None, target) => {
                 let target = target.unwrap_or(TargetOption::Host);
                 let machine = self.true_machine(&rig)?;
-                let built = target.built(PinLink::Files, &rig, &table)?;
+                let built = target.built(&rig, &table)?;
                 let mut journal = journal(built.place(self.seed).name());
                 let result = self.simulated(plan, &machine, target, &built, &mut journal);
                 (journal, result)
@@ -158,7 +157,7 @@ impl CommissionCommand {
         self.write(&designed.text)?;
         let (rig, table) = (&designed.rig, &designed.table);
         let built = journal.step(CommissionStep::Image, |journal| {
-            let built = target.built(PinLink::Files, rig, table)?;
+            let built = target.built(rig, table)?;
             journal.found(format!("rig {:016x}, table {:08x}", table.rig_hash, table.crc()));
             Ok::<_, Failure>(built)
         })?;

@@ -90,8 +90,8 @@ fn exit_status(error: &(dyn Error + 'static)) -> u8 {
         exit_status(error)
     } else if let Some(error) = error.downcast_ref::<RunError>() {
         exit_status_of_a_run(error)
-    } else if let Some(CampaignError::Trial { source, .. }) = error.downcast_ref() {
-        if source.lacks_emulator() { 4 } else { 1 }
+    } else if let Some(CampaignError::Trial { .. }) = error.downcast_ref() {
+        1
     } else if matches!(error.downcast_ref(), Some(BuildError::NoCompiler(_)))
         || matches!(error.downcast_ref(), Some(SiteError::NoCompiler(_)))
     {
@@ -114,7 +114,6 @@ fn exit_status(error: &(dyn Error + 'static)) -> u8 {
 
 fn exit_status_of_a_run(error: &RunError) -> u8 {
     match error {
-        error if error.lacks_emulator() => 4,
         // The scenario is at fault, not the firmware.
         RunError::Harness(
             HarnessError::Simulation(_)

@@ -8,7 +8,7 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_plan::SwingUpError;
 use upright_tool::campaign::{Campaign, Defect, DefectRow, During, Setup, campaign, feed, kinds, one};
-use upright_tool::in_the_loop::{PinLink, RunPlace};
+use upright_tool::in_the_loop::RunPlace;
 
 use crate::failure::Failure;
 use crate::output::print;
@@ -27,7 +27,7 @@ use upright_tool::progress::with_bar;
 Examples:
   upright faults rigs/quadruple-paper.toml
   upright faults rigs/single-quanser-ip02.toml --runs 10000 --seed 7
-  upright faults rigs/quadruple-paper.toml --target qemu --runs 300
+  upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --target board --runs 300
   upright faults rigs/quadruple-paper.toml --swing-up                while it is raised and lowered
   upright faults rigs/quadruple-paper.toml --jog             while the motor pushes the cart a little
@@ -90,7 +90,7 @@ impl FaultsCommand {
         if self.swing_up && table.swing_up.is_none() {
             return Err(Failure::of(rig.name, SwingUpError::NoMotions));
         }
-        let built = self.target.built(PinLink::Files, &rig, &table)?;
+        let built = self.target.built(&rig, &table)?;
         let place = built.place(self.seed);
         let mut possible = kinds(&table, place);
         let forces = if self.shake { Some(feed(&rig, &table, self.seed)?) } else { None };

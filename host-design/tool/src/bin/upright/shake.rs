@@ -11,7 +11,6 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_identify::{LineError, Log, OverLine, shake};
-use upright_tool::in_the_loop::PinLink;
 use upright_tool::in_the_loop::run_shaken;
 use upright_tool::monitor::{SerialLine, now};
 
@@ -33,7 +32,7 @@ use upright_tool::progress::with_spinner;
 #[command(before_help = "\
 Examples:
   upright shake rigs/quadruple-paper.toml --log run.log
-  upright shake rigs/single-quanser-ip02.toml --log run.log --target qemu
+  upright shake rigs/single-quanser-ip02.toml --log run.log --target board
   upright shake my-rig-as-it-is.toml --log run.log --seconds 20 --seed 7
   upright shake my-rig.toml --log run.log --port /dev/ttyACM0       the real machine")]
 pub(crate) struct ShakeCommand {
@@ -93,7 +92,7 @@ impl ShakeCommand {
             return Ok(with_spinner("shaking", || shake(rig, seconds, self.seed))?);
         };
         let (_, table) = with_table(rig, &self.rig, Gains::Sampled)?;
-        let built = target.built(PinLink::Files, rig, &table)?;
+        let built = target.built(rig, &table)?;
         Ok(with_spinner("shaking", || run_shaken(rig, &table, seconds, self.seed, built.place(self.seed)))?)
     }
     /// Shakes the machine behind a port and returns its log.

@@ -30,7 +30,7 @@ Examples:
   upright transitions rigs/double-quanser-dbpen.toml --stored            try the stored motions, print the table
   upright transitions rigs/double-quanser-dbpen.toml                     search all of them first, which takes minutes
   upright transitions rigs/double-quanser-dbpen.toml --only ud-uu --candidates 100..400
-  upright firmware run rigs/double-quanser-dbpen.toml --transitions      all of them in QEMU, bit for bit")]
+  upright firmware run rigs/double-quanser-dbpen.toml --transitions      all of them with the image")]
 pub(crate) struct TransitionsCommand {
     /// Rig file
     #[arg(value_name = "RIG")]

@@ -11,7 +11,7 @@ use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_tool::in_the_loop::{PinLink, RunPlace};
+use upright_tool::in_the_loop::RunPlace;
 use upright_tool::monitor::SerialLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
@@ -28,7 +28,7 @@ use crate::variation::{Variation, Wanted, law_option, positive, with_stored_moti
 Examples:
   upright twin rigs/single-quanser-ip02.toml                  the firmware on this computer, the rig simulated
   upright twin rigs/quadruple-paper.toml                      four links: they stand a short tug only
-  upright twin rigs/quadruple-paper.toml --target qemu        the image in QEMU
+  upright twin rigs/quadruple-paper.toml --target board       the image that is flashed
   upright twin rigs/quadruple-paper.toml --target board       the image that is flashed, on the virtual board
   upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with every step left to you
   upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation can do
@@ -64,7 +64,7 @@ impl TwinCommand {
         let (rig, _, table) = self.variation.designed()?;
         let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
         let built = match self.port {
-            None => Some(self.target.built(PinLink::Files, &rig, &table)?),
+            None => Some(self.target.built(&rig, &table)?),
             Some(_) => None,
         };
         let stop = Arc::new(AtomicBool::new(false));

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use upright_tool::image::ImageKind;
 
 use super::board::{AnyBoard, AnyBoardOption};
 use super::built::{built, built_for_pico};
@@ -44,7 +43,7 @@ impl BuildCommand {
         let image = match self.on.board {
             AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), wanted)?.uf2,
             AnyBoard::F4(board) => {
-                let image = built(ImageKind::Board(board), self.rig.as_deref(), wanted)?;
+                let image = built(board, self.rig.as_deref(), wanted)?;
                 check_ticks(board, self.rig.as_deref(), wanted, &image)?;
                 image
             }

@@ -4,21 +4,21 @@ use std::path::{Path, PathBuf};
 
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, ImageKind, PicoBoard, PicoImage};
+use upright_tool::image::{self, BoardName, PicoBoard, PicoImage};
 
 use crate::failure::Failure;
 use crate::variation::{Wanted, with_stored_motions, with_table};
 use upright_tool::progress::with_spinner;
 
 /// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
-pub(super) fn built(kind: ImageKind, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
+pub(super) fn built(board: BoardName, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
     let Some(path) = rig else {
-        return Ok(with_spinner("building the image", || image::build(kind))?);
+        return Ok(with_spinner("building the image", || image::build(board))?);
     };
     let rig = Rig::from_path(path)?;
-    image::check_rig(kind, &rig)?;
+    image::check_rig(board, &rig)?;
     let table = table_of(&rig, path, wanted)?;
-    Ok(with_spinner("building the image", || image::build_for(kind, &rig, &table))?)
+    Ok(with_spinner("building the image", || image::build_for(board, &rig, &table))?)
 }
 
 /// Builds the image for a Pico or a Pico 2.

@@ -11,7 +11,7 @@ use upright_board::{Conditions, CoreTiming, Image};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_tool::image::{self, BoardName, ImageKind};
+use upright_tool::image::{self, BoardName};
 use upright_tool::in_the_loop::{self, Span, TickFigures};
 use upright_tool::project::checkout;
 use upright_trust::verify::at_rest_disturbed;
@@ -56,9 +56,7 @@ pub(crate) struct CyclesCommand {
 impl CyclesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, table) = designed(&self.rig, Wanted::SwingUp)?;
-        let image = with_spinner("building the image", || {
-            image::build_for(ImageKind::Board(self.on.board), &rig, &table)
-        })?;
+        let image = with_spinner("building the image", || image::build_for(self.on.board, &rig, &table))?;
         let image = read(&image)?;
         let by = |timing| {
             let conditions = Conditions { timing, ..self.on.board.conditions(1) };

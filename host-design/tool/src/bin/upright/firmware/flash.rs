@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
-use upright_tool::image::ImageKind;
 
 use super::board::{AnyBoard, AnyBoardOption};
 use super::built::{built, built_for_pico};
@@ -52,7 +51,7 @@ impl FlashCommand {
                 "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
             ));
         }
-        let image = built(ImageKind::Board(board), self.rig.as_deref(), wanted)?;
+        let image = built(board, self.rig.as_deref(), wanted)?;
         check_ticks(board, self.rig.as_deref(), wanted, &image)?;
         probe_rs(&["download", "--verify", "--chip", board.chip()], Some(&image))?;
         probe_rs(&["reset", "--chip", board.chip()], None)

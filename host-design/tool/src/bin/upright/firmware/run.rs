@@ -3,25 +3,24 @@
 use std::net::TcpListener;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use upright_board::{Conditions, Image, UNITS_PER_SECOND};
 use upright_closed_loop::harness::Recording;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_tool::in_the_loop::{PinLink, RunError, RunPlace, VirtualBoard, run, run_compared, serve};
+use upright_tool::in_the_loop::{RunError, RunPlace, VirtualBoard, run, run_compared, serve};
 
 use crate::failure::Failure;
 use crate::simulate::SimulateCommand;
 use crate::target::TargetOption;
 use upright_tool::progress::with_spinner;
 
-/// Builds the image for the rig, runs it in lock step with the nonlinear plant, and compares every bit with the
-/// firmware on the host; exit status 1 if the pendulum falls or a bit differs.
+/// Builds the image that is flashed, and runs it on the virtual board with the nonlinear plant; exit status 1 if the
+/// pendulum falls, or if a bit differs from the firmware on the host.
 ///
-/// In QEMU, the pins are simulated, and the run is the same as on the host. On the virtual board, the image itself
-/// that is flashed runs, with its registers; its pins drive the plant, and in each tick the firmware on the host gets
-/// the inputs that the image has latched.
+/// The image's pins drive the plant, and in each tick the firmware on the host gets the inputs that the image has
+/// latched.
 ///
 /// The rig is homed while it hangs, held by hand at the start of the scenario until the firmware begins to balance,
 /// and released at time 0. With --swing-up, the image raises the rig from hanging, balances, moves, and lowers it
@@ -29,32 +28,22 @@ use upright_tool::progress::with_spinner;
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
-  upright firmware run rigs/quadruple-paper.toml --step 1 --svg qemu.svg
+  upright firmware run rigs/quadruple-paper.toml --step 1 --svg run.svg
   upright firmware run rigs/quadruple-paper.toml --law pole-placement --tilt 0.004 --csv run.csv
-  upright firmware run rigs/quadruple-paper.toml --target board
-  upright firmware run rigs/single-quanser-ip02.toml --link usart --duration 2
+  upright firmware run rigs/quadruple-paper.toml --target host
   upright firmware run rigs/single-quanser-ip02.toml --swing-up
   upright firmware run rigs/double-quanser-dbpen.toml --transitions
   upright firmware run rigs/single-quanser-ip02.toml --serve 127.0.0.1:7777 --duration 600")]
 pub(crate) struct RunCommand {
     #[command(flatten)]
     simulate: SimulateCommand,
-    /// Where the image runs
-    #[arg(long, value_enum, default_value_t = TargetOption::Qemu)]
+    /// Where the firmware runs
+    #[arg(long, value_enum, default_value_t = TargetOption::Board)]
     target: TargetOption,
-    /// How the pins of the image in QEMU are connected: files of the emulator (fast; Unix only), or serial lines
-    #[arg(long, value_enum, default_value_t = LinkName::Files)]
-    link: LinkName,
     /// Serve `upright firmware monitor tcp:HOST:PORT`: in real time, for --duration (ten minutes with --swing-up),
     /// without the comparison
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["csv", "svg", "json"])]
     serve: Option<String>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum LinkName {
-    Files,
-    Usart,
 }
 
 /// Duration of a served run with --swing-up (s).
@@ -77,13 +66,6 @@ impl RunCommand {
         })
     }
 
-    fn link(&self) -> PinLink {
-        match self.link {
-            LinkName::Files => PinLink::Files,
-            LinkName::Usart => PinLink::Usart,
-        }
-    }
-
     fn serve(&self, address: &str) -> Result<(), Failure> {
         let listener = TcpListener::bind(address)
             .map_err(|error| Failure::argument(format!("--serve {address}: {error}; give HOST:PORT")))?;
@@ -94,7 +76,7 @@ impl RunCommand {
         } else {
             self.simulate.prepared()?
         };
-        let built = self.target.built(self.link(), &rig, &table)?;
+        let built = self.target.built(&rig, &table)?;
         eprintln!("connect with: upright firmware monitor tcp:{}", listener.local_addr()?);
         Ok(with_spinner("serving", || serve(&rig, &table, &scenario, built.place(1), &listener))?)
     }
@@ -107,15 +89,10 @@ impl RunCommand {
         table: &TableValues,
         scenario: &Scenario,
     ) -> Result<Recording, Failure> {
-        let built = self.target.built(self.link(), ours, table)?;
+        let built = self.target.built(ours, table)?;
         match built.place(scenario.seed) {
             RunPlace::Host => Ok(with_spinner("running it", || run(real, table, scenario, RunPlace::Host))?),
             RunPlace::Board { image, conditions } => on_the_board(real, table, scenario, image, &conditions),
-            place @ RunPlace::Qemu { .. } => {
-                let recording = with_spinner("running it in QEMU", || run(real, table, scenario, place))?;
-                compare(real, table, scenario, &recording)?;
-                Ok(recording)
-            }
         }
     }
 }
@@ -143,29 +120,4 @@ fn on_the_board(
         eprintln!("the firmware has turned the motor off: {fault:?}");
     }
     Ok(recording)
-}
-
-/// Repeats the run on the host and compares the ticks bit by bit.
-fn compare(rig: &Rig, table: &TableValues, scenario: &Scenario, qemu: &Recording) -> Result<(), Failure> {
-    let host = run(rig, table, scenario, RunPlace::Host)?;
-    let difference = host.ticks.iter().zip(&qemu.ticks).position(|(host, qemu)| host != qemu);
-    match difference {
-        Some(tick) => Err(Failure::check(format!("QEMU and host differ in tick {tick} after the release"))),
-        None if host.ticks.len() != qemu.ticks.len() => Err(Failure::check(format!(
-            "{} ticks in QEMU, {} on the host",
-            qemu.ticks.len(),
-            host.ticks.len()
-        ))),
-        None => {
-            eprintln!(
-                "{} ticks in QEMU, bit for bit as on the host; at most {} instructions per tick",
-                qemu.ticks.len(),
-                qemu.worst_cycles
-            );
-            if let Some(fault) = qemu.fault {
-                eprintln!("the firmware has turned the motor off: {fault:?}");
-            }
-            Ok(())
-        }
-    }
 }

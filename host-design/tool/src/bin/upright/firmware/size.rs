@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    ImageKind, ImagePart, LinkedImage, RAM_LIMIT, StackBound, StackError, forbidden_functions, size,
-    stack_bound, wrong_functions,
+    ImagePart, LinkedImage, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
+    wrong_functions,
 };
 
 use super::board::{AnyBoard, AnyBoardOption};
@@ -46,7 +46,7 @@ impl SizeCommand {
             Some(path) => path,
             None => match self.on.board {
                 AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), Wanted::SwingUp)?.elf,
-                AnyBoard::F4(board) => built(ImageKind::Board(board), self.rig.as_deref(), Wanted::SwingUp)?,
+                AnyBoard::F4(board) => built(board, self.rig.as_deref(), Wanted::SwingUp)?,
             },
         };
         let image = LinkedImage::read(&path)?;
