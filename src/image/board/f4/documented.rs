@@ -66,29 +66,38 @@ fn board_row(board: &BoardData) -> String {
     let led = if board.status_led_is_low { "low" } else { "high" };
     let [shortest_ms, longest_ms] = ticks::TICK_US.map(|us| f64::from(us) / 1e3);
     format!(
-        "| `{}` | {} | {chip} | {} | {shortest_ms} to {longest_ms} ms | {} MHz {} | {}, on while {led} | {} V | {} |",
+        "| `{}` | {} | {chip} | {} | {shortest_ms} to {longest_ms} ms | {} MHz {} | {}, on while {led} |",
         board.name,
         board.title,
         encoders(board.wiring) - 1,
         board.crystal_hz / 1_000_000,
         sources.collect::<Vec<_>>().join(", else "),
         pin(&board.status_led),
-        board.reference_v,
-        board.special
     )
 }
 
-/// The rows of the table between the markers of `name`, without its two header lines.
+fn notes_row(board: &BoardData) -> String {
+    format!("| `{}` | {} V | {} |", board.name, board.reference_v, board.special)
+}
+
+/// The lines of the table between the markers of `name`.
 fn documented<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
     let table = text
         .split_once(&format!("<!-- {name} -->"))
         .and_then(|(_, rest)| rest.split_once(&format!("<!-- /{name} -->")));
-    table.unwrap_or_else(|| panic!("docs/board.md has no table {name}")).0.trim().lines().skip(2).collect()
+    table.unwrap_or_else(|| panic!("docs/board.md has no table {name}")).0.trim().lines().collect()
+}
+
+/// The lines of a table with these heads of its columns.
+fn table(heads: &[&str], rows: impl Iterator<Item = String>) -> Vec<String> {
+    let lines = [format!("| {} |", heads.join(" | ")), format!("|{}", "---|".repeat(heads.len()))];
+    lines.into_iter().chain(rows).collect()
 }
 
 fn defined(wiring: &[Wire]) -> Vec<String> {
     let has_bus = wiring.iter().any(|wire| matches!(wire.signal, Signal::AngleSelect));
-    wiring.iter().map(|wire| row(wire, has_bus)).collect()
+    let heads = ["pin", "function", "connected to", "inside"];
+    table(&heads, wiring.iter().map(|wire| row(wire, has_bus)))
 }
 
 #[test]
@@ -106,7 +115,11 @@ fn a_wrong_pin_on_the_page_is_noticed() {
 
 #[test]
 fn the_page_shows_the_boards_of_the_image() {
-    let boards: Vec<_> = ALL.into_iter().map(board_row).collect();
+    let heads = ["`--board`", "board", "chip", "links", "tick", "clock at HSE", "status LED"];
+    let boards = table(&heads, ALL.into_iter().map(board_row));
     assert_eq!(documented(PAGE, "boards"), boards, "write src/image/board/f4/boards/ into docs/board.md");
-    assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "boards"), boards);
+    assert_ne!(documented(&PAGE.replace("| tick | clock", "| clock | tick"), "boards"), boards);
+    let notes = table(&["`--board`", "supply of the chip", "special"], ALL.into_iter().map(notes_row));
+    assert_eq!(documented(PAGE, "notes"), notes, "write src/image/board/f4/boards/ into docs/board.md");
+    assert_ne!(documented(&PAGE.replace("| 3 V |", "| 3.3 V |"), "notes"), notes);
 }
