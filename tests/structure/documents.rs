@@ -118,8 +118,8 @@ fn every_result_says_when_and_how_it_was_made() {
     for (name, text) in results() {
         assert!(is_dated(&text), "{name}: the first paragraph has no day, or no command");
     }
-    assert!(is_dated("# Results\n\nMade on 2026-11-26 by `cargo upright coverage`.\n"));
-    assert!(!is_dated("# Results\n\nMade in November 2026 by `cargo upright coverage`.\n"));
+    assert!(is_dated("# Results\n\nMade on 2026-11-26 by `cargo upright identify --coverage`.\n"));
+    assert!(!is_dated("# Results\n\nMade in November 2026 by `cargo upright identify --coverage`.\n"));
     assert!(!is_dated("# Results\n\nMade on 2026-11-26.\n"));
 }
 

@@ -25,11 +25,12 @@ struct Widening {
     least: f64,
 }
 
-/// Factor on both, if the drive imposes the cart's motion, so that `upright coverage` with 40 machines covers at least
-/// 95 % of each kind on double-stepper (seed 5) and 98 % on single-stepper (seeds 1 and 5).
+/// Factor on both, if the drive imposes the cart's motion, so that `upright identify --coverage` with 40 machines
+/// covers at least 95 % of each kind on double-stepper (seed 5) and 98 % on single-stepper (seeds 1 and 5).
 const IF_MOVED: f64 = 1.8;
 
-/// Tuned with `upright coverage` on the machines of seeds 1 and 2, so that 95 % of the intervals cover the truth.
+/// Tuned with `upright identify --coverage` on the machines of seeds 1 and 2, so that 95 % of the intervals cover the
+/// truth.
 fn widening(kind: ParameterKind) -> Widening {
     let [of_change, least] = match kind {
         ParameterKind::TotalMass => [0.6, 4e-4],

@@ -84,7 +84,7 @@ fn merged_shards_of_every_study_are_one_run() {
             "--duration",
             "2",
         ],
-        &["false-alarms", single, "--runs", "4", "--duration", "2"],
+        &["faults", "--healthy", single, "--runs", "4", "--duration", "2"],
         &["swing-up", single, "--table", "--runs", "2"],
     ] {
         Split::new(study).is_the_same_in_3_shards();
@@ -92,9 +92,28 @@ fn merged_shards_of_every_study_are_one_run() {
 }
 
 #[test]
+fn a_study_is_an_option_of_the_command_that_has_its_subject() {
+    let refused = |arguments: &[&str], why: &str| {
+        let output = upright(arguments);
+        assert_eq!((status(&output), stdout(&output)), (2, ""), "{arguments:?}");
+        assert!(stderr(&output).contains(why), "{arguments:?}: {}", stderr(&output));
+    };
+    let single = &path_of(SINGLE);
+    refused(&["false-alarms", single], "use `upright faults --healthy`");
+    refused(&["coverage", single, "--runs", "1"], "use `upright identify --coverage`");
+    refused(&["faults", single, "--duration", "1"], "--healthy");
+    refused(&["faults", single, "--healthy", "--jog"], "--jog");
+    refused(&["identify", single, "--off", "10"], "--coverage");
+    refused(&["identify", single, "run.log", "--coverage"], "--coverage");
+    refused(&["identify", single, "run.log", "--shard", "1/2"], "only with --coverage");
+    refused(&["identify", single], "<FILE>");
+}
+
+#[test]
 fn what_is_not_every_shard_of_this_study_once_is_refused() {
     let single = &path_of(SINGLE);
-    let study = Split::new(&["false-alarms", single, "--runs", "5", "--duration", "0.1", "--law", "lqr"]);
+    let study =
+        Split::new(&["faults", "--healthy", single, "--runs", "5", "--duration", "0.1", "--law", "lqr"]);
     let [one, two, three] = [1, 2, 3].map(|number| study.shard(number, 3));
     let refused = |files: &[&PathBuf], why: &str| {
         let output = study.merge(files);
@@ -104,7 +123,8 @@ fn what_is_not_every_shard_of_this_study_once_is_refused() {
     refused(&[&one, &three], "shard 2 of 3 is missing");
     refused(&[&one, &two, &three, &two], "shard 2 is there twice");
     refused(&[&one, &two, &study.shard(2, 2)], "2 shards, not 3 shards");
-    let other = Split::new(&["false-alarms", single, "--runs", "6", "--duration", "0.1", "--law", "lqr"]);
+    let other =
+        Split::new(&["faults", "--healthy", single, "--runs", "6", "--duration", "0.1", "--law", "lqr"]);
     refused(&[&one, &two, &other.shard(3, 3)], "another study");
     // Files that were cut off, changed, or never written.
     let lines: Vec<String> =

@@ -173,7 +173,7 @@ fn the_report_of_a_stepper_shows_its_acceleration() {
 
 #[test]
 fn a_healthy_stepper_is_not_turned_off() {
-    let healthy = |rig: &str| upright(&["false-alarms", rig, "--runs", "4", "--duration", "60"]);
+    let healthy = |rig: &str| upright(&["faults", "--healthy", rig, "--runs", "4", "--duration", "60"]);
     let quiet = healthy(&stepper());
     assert_eq!(status(&quiet), 0, "{}{}", stdout(&quiet), stderr(&quiet));
     // Negative control: disturbed thirty times as much as the design expects.

@@ -61,6 +61,7 @@ fn friction_of_the_cart_changes_nothing_before_the_motor_slips() {
     assert!(friction.not_on(&rig("single-stepper")).is_some());
     let motor = with_motor("[verify]\ncart_friction_n = 10");
     assert_eq!((friction.not_on(&motor), &motor.must_survive[..]), (None, &[(friction, 10.0)][..]));
+    assert!(format!("{motor:?}").contains("must_survive: [(cart_friction_n, 10.0)]"));
     assert_eq!(with(&motor, "cart_friction_n", 10.0).stayed_on, 1);
     assert_eq!(with(&motor, "cart_friction_n", 100.0).stayed_on, 0, "negative control");
 }

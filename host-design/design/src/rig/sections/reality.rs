@@ -139,7 +139,7 @@ keys! {
 }
 
 /// How the dry friction of the simulated machine depends on travel and speed. A rig file has no key for it: its
-/// machine has the first. `upright coverage` simulates the others, too.
+/// machine has the first. `upright identify --coverage` simulates the others, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FrictionLaw {
     /// An elasto-plastic bristle, which sticks.

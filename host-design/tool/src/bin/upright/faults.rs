@@ -1,5 +1,7 @@
 //! `upright faults`
 
+mod healthy;
+
 use std::io::Write;
 
 use clap::Args;
@@ -9,6 +11,8 @@ use upright_design::study::Study;
 use upright_plan::SwingUpError;
 use upright_tool::campaign::{Campaign, Defect, DefectRow, During, Setup, campaign, feed, kinds, one};
 use upright_tool::in_the_loop::RunPlace;
+
+use healthy::HealthyOptions;
 
 use crate::failure::Failure;
 use crate::output::print;
@@ -35,7 +39,10 @@ Examples:
   upright faults rigs/quadruple-paper.toml --only 1234               repeats one run, bit for bit
   upright faults rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl     the second third of the runs
   upright faults rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl
-  upright faults rigs/quadruple-paper.toml --kind motor-dead --json")]
+  upright faults rigs/quadruple-paper.toml --kind motor-dead --json
+  upright faults rigs/quadruple-robust.toml --healthy                2 h of each law, 6 minutes for each machine
+  upright faults rigs/single-quanser-ip02.toml --healthy --runs 100 --duration 3600
+  upright faults rigs/quadruple-robust.toml --healthy --corners      every combination of wrong masses")]
 pub(crate) struct FaultsCommand {
     #[command(flatten)]
     variation: Variation,
@@ -54,9 +61,9 @@ pub(crate) struct FaultsCommand {
     /// Seed of the campaign
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Number of runs
-    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    runs: u64,
+    /// Number of runs: 1000, or with --healthy 20 for each law
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    runs: Option<u64>,
     /// Only defects of this kind
     #[arg(long, value_parser = kind)]
     kind: Option<Defect>,
@@ -68,7 +75,12 @@ pub(crate) struct FaultsCommand {
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten, next_help_heading = "Machines without a defect")]
+    healthy: HealthyOptions,
 }
+
+/// Runs of a campaign.
+const RUNS: u64 = 1000;
 
 /// Runs of each kind in the negative control without detection.
 const CONTROL_RUNS: u64 = 12;
@@ -81,6 +93,10 @@ fn kind(name: &str) -> Result<Defect, String> {
 
 impl FaultsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        if self.healthy.healthy {
+            return self.healthy.run(&self.variation, self.runs, &self.split, self.json);
+        }
+        let runs = self.runs.unwrap_or(RUNS);
         let (rig, _, table) = self.variation.designed()?;
         let table = if self.swing_up {
             with_stored_motions(&self.variation.rig, &rig, table, Wanted::SwingUp)?
@@ -116,11 +132,11 @@ impl FaultsCommand {
         }
         let options = json!({
             "gains": self.variation.changes(), "swing_up": self.swing_up, "jog": self.jog,
-            "shake": self.shake, "target": self.target.name(), "seed": self.seed, "runs": self.runs, "kind": self.kind,
+            "shake": self.shake, "target": self.target.name(), "seed": self.seed, "runs": runs, "kind": self.kind,
         });
         let work = |study: &Study| -> Result<_, Failure> {
-            let result = with_bar("faults", self.runs, |tick| {
-                campaign(&setup, &chosen, self.seed, self.runs, (study, "faults"), tick)
+            let result = with_bar("faults", runs, |tick| {
+                campaign(&setup, &chosen, self.seed, runs, (study, "faults"), tick)
             })?;
             let control = self.control(&setup, &chosen, study)?;
             Ok((result, control, self.unguarded(&setup, &chosen, study)?))

@@ -1,5 +1,7 @@
 //! `upright identify`
 
+mod coverage;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +10,8 @@ use upright_design::rig::Rig;
 use upright_design::table::write_atomically;
 use upright_identify::{Identification, Log, Recordings, Settings, identify_recordings, rig_file};
 use upright_tool::identified::{json, page, text};
+
+use coverage::CoverageOptions;
 
 use crate::failure::Failure;
 use crate::reading::ReadingArgs;
@@ -34,13 +38,14 @@ Examples:
   upright identify rigs/quadruple-paper.toml run.log --json | jq .estimates
   upright identify my-rig.toml swing-*.csv --clamped --angles absolute --zero upright --predict other-*.csv
   upright identify rigs/quadruple-paper.toml run.log --csv run.csv      only converts
-  upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler")]
+  upright identify rigs/quadruple-paper.toml run.log --mcap run.mcap    for Foxglove and PlotJuggler
+  upright identify rigs/quadruple-paper.toml --coverage --off 30        how well it identifies simulated machines")]
 pub(crate) struct IdentifyCommand {
     /// Rig file that the firmware was designed for
     #[arg(value_name = "RIG")]
     rig: PathBuf,
     /// Logs or tables of this machine, all recorded after the same homing
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required_unless_present = "coverage")]
     logs: Vec<PathBuf>,
     /// Other recordings, which are only predicted, with the old and the new numbers, over 0.5, 1 and 2 s
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -80,10 +85,18 @@ pub(crate) struct IdentifyCommand {
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten, next_help_heading = "Simulated machines")]
+    coverage: CoverageOptions,
 }
 
 impl IdentifyCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        if self.coverage.coverage {
+            return self.coverage.run(&self.rig, self.trust_wiring, self.json);
+        }
+        if self.coverage.split.is_used() {
+            return Err(Failure::argument("--shard and --merge: only with --coverage, which has many runs"));
+        }
         let rig = Rig::from_path(&self.rig)?;
         let recordings = Recordings::from_paths(&rig, &self.logs, &self.reading.reading())?;
         if let Some(path) = &self.csv {

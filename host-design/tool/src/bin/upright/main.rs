@@ -3,11 +3,9 @@
 mod check;
 mod commission;
 mod compare;
-mod coverage;
 mod design;
 mod export;
 mod failure;
-mod false_alarms;
 mod faults;
 mod firmware;
 mod identify;
@@ -28,6 +26,8 @@ mod variation;
 mod verify;
 
 use std::process::ExitCode;
+
+use failure::Failure;
 
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -68,12 +68,10 @@ enum UprightCommand {
     Commission(commission::CommissionCommand),
     Design(design::DesignCommand),
     Export(export::ExportCommand),
-    FalseAlarms(false_alarms::HealthyHoursCommand),
     Faults(faults::FaultsCommand),
     Firmware(firmware::FirmwareCommand),
     Report(report::ReportCommand),
     Compare(compare::CompareCommand),
-    Coverage(coverage::IdentifiedMachinesCommand),
     Robust(robust::RobustCommand),
     Shake(shake::ShakeCommand),
     Identify(identify::IdentifyCommand),
@@ -95,7 +93,15 @@ fn with_negative_numbers(command: Command) -> Command {
     command.mut_args(takes_number).mut_subcommands(with_negative_numbers)
 }
 
+/// What is an option of another command, and not a command.
+const OPTIONS: [(&str, &str); 2] =
+    [("false-alarms", "faults --healthy"), ("coverage", "identify --coverage")];
+
 fn main() -> ExitCode {
+    let typed = std::env::args().nth(1);
+    if let Some((name, option)) = OPTIONS.into_iter().find(|(name, _)| typed.as_deref() == Some(name)) {
+        return Failure::argument(format!("there is no command `{name}`: use `upright {option}`")).report();
+    }
     let matches = with_negative_numbers(Arguments::command()).get_matches();
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {
@@ -103,12 +109,10 @@ fn main() -> ExitCode {
         UprightCommand::Commission(command) => command.run(),
         UprightCommand::Design(command) => command.run(),
         UprightCommand::Export(command) => command.run(),
-        UprightCommand::FalseAlarms(command) => command.run(),
         UprightCommand::Faults(command) => command.run(),
         UprightCommand::Firmware(command) => command.run(),
         UprightCommand::Report(command) => command.run(),
         UprightCommand::Compare(command) => command.run(),
-        UprightCommand::Coverage(command) => command.run(),
         UprightCommand::Robust(command) => command.run(),
         UprightCommand::Shake(command) => command.run(),
         UprightCommand::Identify(command) => command.run(),

@@ -1,4 +1,4 @@
-//! `upright false-alarms`
+//! `upright faults --healthy`
 
 use clap::Args;
 use serde_json::json;
@@ -13,46 +13,38 @@ use crate::split::Split;
 use crate::variation::{Variation, law_option, positive};
 use upright_tool::progress::with_bar;
 
-/// Balances machines without a defect with the whole firmware, and counts false alarms: how many are turned off. Exit
-/// status 1 if any is.
-///
-/// The machines are drawn within the tolerances of [robust]; without [robust], each is the machine of [reality].
+/// Number of machines for each law.
+const MACHINES: u64 = 20;
+
+/// What `--healthy` takes.
 #[derive(Args)]
-#[command(
-    name = "false-alarms",
-    before_help = "\
-Examples:
-  upright false-alarms rigs/quadruple-robust.toml                      2 h of each law, 6 minutes for each machine
-  upright false-alarms rigs/single-quanser-ip02.toml --runs 100 --duration 3600
-  upright false-alarms rigs/quadruple-robust.toml --corners            every combination of wrong masses
-  upright false-alarms rigs/quadruple-robust.toml --shard 2/3 > 2.jsonl
-  upright false-alarms rigs/quadruple-robust.toml --merge 1.jsonl 2.jsonl 3.jsonl"
-)]
-pub(crate) struct HealthyHoursCommand {
-    #[command(flatten)]
-    variation: Variation,
-    /// Number of machines for each law
-    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    runs: u32,
+pub(super) struct HealthyOptions {
+    /// Inject no defect: balance --runs machines (20) of each law, drawn within [robust], and count false alarms: how
+    /// many are turned off. Exit status 1 if any is. Without [robust], each is the machine of [reality]
+    #[arg(long, conflicts_with_all = ["swing_up", "jog", "shake", "target", "seed", "kind", "only"])]
+    pub(super) healthy: bool,
     /// One machine for each combination of wrong masses, with the full friction, wrong zeros and latency of [robust]
-    #[arg(long, conflicts_with = "runs")]
+    #[arg(long, requires = "healthy", conflicts_with = "runs")]
     corners: bool,
     /// Time for which each machine balances (s)
-    #[arg(long, default_value_t = 360.0, value_name = "S", value_parser = positive)]
+    #[arg(long, requires = "healthy", default_value_t = 360.0, value_name = "S", value_parser = positive)]
     duration: f64,
     /// Only this law
-    #[arg(long, value_parser = law_option())]
+    #[arg(long, requires = "healthy", value_parser = law_option())]
     law: Option<Law>,
-    #[command(flatten)]
-    split: Split,
-    /// Print the result as one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
-impl HealthyHoursCommand {
-    pub(crate) fn run(self) -> Result<(), Failure> {
-        let (rig, _, table) = self.variation.designed()?;
+impl HealthyOptions {
+    /// Balances machines without a defect with the whole firmware, and counts false alarms.
+    pub(super) fn run(
+        &self,
+        variation: &Variation,
+        runs: Option<u64>,
+        split: &Split,
+        json: bool,
+    ) -> Result<(), Failure> {
+        let (rig, _, table) = variation.designed()?;
+        let runs = runs.unwrap_or(MACHINES);
         let laws: Vec<Law> = table
             .laws
             .present()
@@ -65,7 +57,7 @@ impl HealthyHoursCommand {
             ));
         }
         let machines = match &rig.robust {
-            _ if !self.corners => Machines::Drawn(self.runs.into()),
+            _ if !self.corners => Machines::Drawn(runs),
             Some(tolerances) if tolerances.mass_percent > 0.0 => Machines::Corners,
             _ => {
                 return Err(Failure::argument(
@@ -74,8 +66,7 @@ impl HealthyHoursCommand {
             }
         };
         let options = json!({
-            "gains": self.variation.changes(), "runs": (!self.corners).then_some(self.runs), "duration": self.duration,
-            "law": self.law.map(Law::key),
+            "gains": variation.changes(), "runs": (!self.corners).then_some(runs), "duration": self.duration, "law": self.law.map(Law::key),
         });
         let work = |study: &Study| -> Result<Vec<FalseAlarms>, Failure> {
             Ok(with_bar("machines", laws.len() as u64 * machines.count(&rig), |done| {
@@ -84,12 +75,12 @@ impl HealthyHoursCommand {
                 laws.iter().map(of_law).collect::<Result<_, _>>()
             })?)
         };
-        self.split.study("false-alarms", &rig, &options, work, |found| self.print(&rig, &found))
+        split.study("faults --healthy", &rig, &options, work, |found| self.print(&rig, &found, json))
     }
 
-    fn print(&self, rig: &Rig, found: &[FalseAlarms]) -> Result<(), Failure> {
+    fn print(&self, rig: &Rig, found: &[FalseAlarms], json: bool) -> Result<(), Failure> {
         let object = json!({ "rig": rig.name, "duration_s": self.duration, "laws": found });
-        print(self.json, &object, || text(found))?;
+        print(json, &object, || text(found))?;
         let alarms: Vec<String> = found
             .iter()
             .flat_map(|one| {

@@ -1,6 +1,6 @@
-//! `upright coverage`
+//! `upright identify --coverage`
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -14,45 +14,33 @@ use crate::split::Split;
 use crate::variation::not_negative;
 use upright_tool::progress::with_bar;
 
-/// Shakes and identifies simulated machines that differ from the rig file, and counts how many 95 % intervals cover
-/// the true values.
-///
-/// Masses, lengths and inertias are drawn within --off of the file, friction within a factor of 3 of what is usual;
-/// air drag, zeros, tilt, latency, dead zone, travel per count and errors of absolute sensors are drawn, too.
+/// What `--coverage` takes.
 #[derive(Args)]
-#[command(before_help = "\
-Examples:
-  upright coverage rigs/double-quanser-dbpen.toml
-  upright coverage rigs/quadruple-paper.toml --off 30 --seed 7
-  upright coverage rigs/quadruple-paper.toml --shard 2/3 > 2.jsonl
-  upright coverage rigs/quadruple-paper.toml --merge 1.jsonl 2.jsonl 3.jsonl")]
-pub(crate) struct IdentifiedMachinesCommand {
-    /// Rig file
-    #[arg(value_name = "RIG")]
-    rig: PathBuf,
+pub(super) struct CoverageOptions {
+    /// Read no file: shake and identify simulated machines that differ from the rig file, and count how many 95 %
+    /// intervals cover the true values. Masses, lengths and inertias are drawn within --off of the file, friction
+    /// within a factor of 3 of what is usual; air drag, zeros, tilt, latency, dead zone, travel per count and errors
+    /// of absolute sensors are drawn, too
+    #[arg(long, conflicts_with_all = ["logs", "predict", "write", "eccentricity", "weigh", "trust_numbers",
+        "without_drag", "without_dry", "report", "csv", "mcap"])]
+    pub(super) coverage: bool,
     /// Number of machines
-    #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, requires = "coverage", default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     runs: u32,
     /// Largest error of the file's masses, lengths and inertias (%)
-    #[arg(long, default_value_t = 10.0, value_name = "PERCENT", value_parser = below_90)]
+    #[arg(long, requires = "coverage", default_value_t = 10.0, value_name = "PERCENT", value_parser = below_90)]
     off: f64,
     /// Duration of each log (s)
-    #[arg(long, default_value_t = 20, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
+    #[arg(long, requires = "coverage", default_value_t = 20, value_name = "S", value_parser = clap::value_parser!(u16).range(5..=3600))]
     seconds: u16,
     /// Seed of the machines
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, requires = "coverage", default_value_t = 1)]
     seed: u64,
     /// Law of the machines' dry friction; the true value is that at high speed
-    #[arg(long, value_enum, default_value_t, value_name = "LAW")]
+    #[arg(long, requires = "coverage", value_enum, default_value_t, value_name = "LAW")]
     friction: Friction,
-    /// Take the wiring from the file instead of identifying it; faster
-    #[arg(long)]
-    trust_wiring: bool,
     #[command(flatten)]
-    split: Split,
-    /// Print the result as one JSON object
-    #[arg(long)]
-    json: bool,
+    pub(super) split: Split,
 }
 
 /// Law of the machines' dry friction.
@@ -89,31 +77,31 @@ fn below_90(text: &str) -> Result<f64, String> {
     })
 }
 
-impl IdentifiedMachinesCommand {
-    pub(crate) fn run(self) -> Result<(), Failure> {
-        let rig = Rig::from_path(&self.rig)?;
+impl CoverageOptions {
+    pub(super) fn run(&self, rig: &Path, trust_wiring: bool, json: bool) -> Result<(), Failure> {
+        let rig = Rig::from_path(rig)?;
         let drawn = Drawn {
             runs: u64::from(self.runs),
             off_percent: self.off,
             seconds: f64::from(self.seconds),
             friction: self.friction.into(),
             seed: self.seed,
-            trust_wiring: self.trust_wiring,
+            trust_wiring,
         };
         let friction = self.friction.to_possible_value().map(|value| value.get_name().to_owned());
         let options = json!({
             "runs": self.runs, "off": self.off, "seconds": self.seconds, "seed": self.seed,
-            "trust_wiring": self.trust_wiring, "friction": friction,
+            "trust_wiring": trust_wiring, "friction": friction,
         });
         let work = |study: &Study| -> Result<Coverage, Failure> {
             Ok(with_bar("machines", drawn.runs, |done| coverage(&rig, &drawn, study, done))?)
         };
-        self.split.study("coverage", &rig, &options, work, |found| self.print(&rig, &found))
+        self.split.study("identify --coverage", &rig, &options, work, |found| self.print(&rig, &found, json))
     }
 
-    fn print(&self, rig: &Rig, found: &Coverage) -> Result<(), Failure> {
+    fn print(&self, rig: &Rig, found: &Coverage, json: bool) -> Result<(), Failure> {
         let object = json!({ "rig": rig.name, "off_percent": self.off, "coverage": found });
-        print(self.json, &object, || text(found))
+        print(json, &object, || text(found))
     }
 }
 
