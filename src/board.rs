@@ -42,6 +42,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::actuator::Drive;
 use crate::control::encoder::CounterWidth;
+use crate::table::DriveMap;
 
 /// All inputs, read at the start of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,10 +140,10 @@ impl Output {
         if let Drive::Steps(pulses) = self.drive { pulses } else { 0 }
     }
 
-    /// Motor on. `force_limit_n` is the largest force of the gain table (N): see [`Drive::duty`].
+    /// Motor on, with a command to the drive `map` of the gain table: see [`Drive::duty`].
     #[inline(always)]
-    pub fn on(drive: Drive, force_limit_n: f32) -> Self {
-        Self { enable: true, duty: drive.duty(force_limit_n), drive }
+    pub fn on(drive: Drive, map: &DriveMap) -> Self {
+        Self { enable: true, duty: drive.duty(map), drive }
     }
 }
 

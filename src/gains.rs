@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(14),
+    format: upright::table_format!(15),
     // Number of states; equal to `NX` in a sound table.
     states: 10,
     // Number of sensors; equal to `NY` in a sound table.
@@ -40,13 +40,19 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     rig_hash: RIG_HASH,
     // Control period (s).
     tick_s: TICK_S,
-    // Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
-    // later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ, and up to 1.2 with both.
-    pending_acts: 0.0,
-    // Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
-    pending_stays: 0.0,
-    // Largest force on the cart (N).
-    force_limit_n: 20.0,
+    // The drive of the cart.
+    drive: DriveMap::Force(ForceMap {
+        // Largest force on the cart (N).
+        limit_n: 20.0,
+        // What a delay or a lag leaves of it for later.
+        late: Late {
+            // Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
+            // later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ, and up to 1.2 with both.
+            acts: 0.0,
+            // Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
+            stays: 0.0,
+        },
+    }),
     // Gains of the control laws that are designed, at least one.
     laws: PerLaw {
         // Gains of the linear quadratic regulator, if designed.
@@ -110,11 +116,6 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     }),
     // Known Coulomb friction, if there is any: it is compensated.
     friction: None,
-    // The motor, if described: without it the controller gives a force.
-    motor: None,
-    // The drive, if it imposes the cart's acceleration: then that is the input of the plant instead of the force,
-    // and `force_limit_n` limits nothing.
-    steps: None,
     // Limits that the supervisor enforces.
     limits: Limits {
         // Soft limits of the rail, low and high (m).
@@ -184,7 +185,7 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         still_counts: [1, 1, 1, 1, 1],
     },
     // CRC-32 of all values above.
-    crc: 0x0eb6_5da0,
+    crc: 0x1796_29a0,
 };
 
 /// This table has no swing-up.

@@ -50,7 +50,7 @@
 //! counts[1] = 3; // the first link leans by three counts
 //! let command = controller.control(&counts); // at the start of a tick; then drive the motor
 //! controller.predict(); // any time before the next tick
-//! assert!(command.applied_n != 0.0 && command.applied_n.abs() <= TABLE.force_limit_n);
+//! assert!(command.applied_n != 0.0 && command.applied_n.abs() <= TABLE.drive.largest_force_n());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

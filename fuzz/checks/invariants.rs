@@ -68,7 +68,7 @@ impl Invariants {
         assert!(duty.abs() <= 1.0 && (enable || duty == 0.0), "{duty}");
         match drive {
             Drive::Force(force) => {
-                assert!(force.is_finite() && force.abs() <= TABLE.force_limit_n, "{force}")
+                assert!(force.is_finite() && force.abs() <= TABLE.drive.largest_force_n(), "{force}")
             }
             Drive::Duty(duty) => assert!(duty.is_finite() && duty.abs() <= 1.0, "{duty}"),
             Drive::Steps(_) => panic!("pulses for a motor"),
@@ -221,5 +221,5 @@ pub(crate) fn telemetry(telemetry: &Telemetry<STATES, SENSORS>) {
     let vectors = telemetry.estimate.iter().chain(&telemetry.innovation);
     let numbers = [telemetry.setpoint_m, telemetry.requested_n, telemetry.applied_n, telemetry.drive];
     assert!(vectors.chain(&numbers).all(|number| number.is_finite()), "{telemetry:?}");
-    assert!(telemetry.applied_n.abs() <= TABLE.force_limit_n, "{telemetry:?}");
+    assert!(telemetry.applied_n.abs() <= TABLE.drive.largest_force_n(), "{telemetry:?}");
 }

@@ -49,7 +49,7 @@ impl SimulatedRig {
         }
         let force = match self.output.drive {
             Drive::Force(force) => force,
-            Drive::Duty(duty) => duty * TABLE.force_limit_n,
+            Drive::Duty(duty) => duty * TABLE.drive.largest_force_n(),
             Drive::Steps(_) => panic!("pulses for a motor"),
         };
         let mut next = [0.0; STATES];

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
-use crate::table::{MotorMap, Scalar, StepMap};
+use crate::table::{DriveMap, MotorMap, Scalar, StepMap};
 
 /// Command to the power stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,20 +22,13 @@ impl Drive {
     /// No force, motor off.
     pub const OFF: Self = Drive::Force(0.0);
 
-    /// The command for `force` (N) on a cart at rest. Without motor data, it is the force itself.
-    pub fn at_rest(force: f32, motor: Option<&MotorMap>) -> Self {
-        match motor {
-            None => Drive::Force(force),
-            Some(motor) => Drive::Duty(motor.duty(motor.volts_per_newton * force)),
-        }
-    }
-
-    /// The command as a duty cycle from -1 to 1. A force becomes a fraction of `force_limit` (N): for a power stage
-    /// that controls the motor current and reaches the limit at full scale.
+    /// The command as a duty cycle from -1 to 1. A force becomes a fraction of the largest one of `map`: for a power
+    /// stage that controls the motor current and reaches the limit at full scale.
     /// Pulses are no duty.
-    pub fn duty(self, force_limit: f32) -> f32 {
+    #[inline]
+    pub fn duty(self, map: &DriveMap) -> f32 {
         match self {
-            Drive::Force(force) => saturate(force / force_limit, 1.0),
+            Drive::Force(force) => saturate(force / map.largest_force_n(), 1.0),
             Drive::Duty(duty) => saturate(duty, 1.0),
             Drive::Steps(_) => 0.0,
         }
@@ -83,6 +76,11 @@ impl<T: Scalar> MotorMap<T> {
         if volts == wanted { (volts, force) } else { (volts, (volts - back_emf) / self.volts_per_newton) }
     }
 
+    /// Duty cycle for `force` (N) on a cart at rest.
+    pub fn duty_at_rest(&self, force: T) -> T {
+        self.duty(self.volts_per_newton * force)
+    }
+
     /// Duty cycle for `volts`, with the dead zone compensated.
     ///
     /// The compensation rises ten times as fast as the voltage, up to the whole dead zone. So the duty cycle does not
@@ -96,8 +94,10 @@ impl<T: Scalar> MotorMap<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::{ForceMap, Late};
 
     const MOTOR: MotorMap = MotorMap {
+        force: ForceMap { limit_n: 20.0, late: Late { acts: 0.0, stays: 0.0 } },
         volts_per_newton: 2.0,
         volts_per_speed: 4.0,
         dead_zone_v: 1.0,
@@ -135,13 +135,16 @@ mod tests {
 
     #[test]
     fn a_force_is_a_share_of_the_limit() {
-        assert_eq!(Drive::Force(-5.0).duty(20.0), -0.25);
-        assert_eq!(Drive::Force(30.0).duty(20.0), 1.0);
-        assert_eq!(Drive::Duty(-0.5).duty(20.0), -0.5);
-        assert_eq!(Drive::OFF.duty(20.0), 0.0);
-        assert_eq!(Drive::at_rest(-5.0, None), Drive::Force(-5.0));
-        assert_eq!(Drive::at_rest(-2.5, Some(&MOTOR)), Drive::Duty(-0.5));
-        assert_eq!(Drive::Force(f32::NAN).duty(20.0), 0.0);
+        for map in [DriveMap::Force(MOTOR.force), DriveMap::Volts(MOTOR)] {
+            assert_eq!(Drive::Force(-5.0).duty(&map), -0.25);
+            assert_eq!(Drive::Force(30.0).duty(&map), 1.0);
+            assert_eq!(Drive::Duty(-0.5).duty(&map), -0.5);
+            assert_eq!(Drive::OFF.duty(&map), 0.0);
+            assert_eq!(Drive::Force(f32::NAN).duty(&map), 0.0);
+        }
+        assert_eq!(MOTOR.duty_at_rest(-2.5), -0.5);
+        let pulses = DriveMap::Pulses(StepMap::ideal(0.001));
+        assert_eq!((Drive::OFF.duty(&pulses), Drive::Steps(9).duty(&pulses)), (0.0, 0.0));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::control::encoder::{CounterWidth, Encoders};
 use crate::control::observer::Observer;
 pub use crate::control::rejected::Rejected;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
-use crate::table::{GainTable, Law, LawGains, Scalar, TableError};
+use crate::table::{DriveMap, GainTable, Law, LawGains, MotorMap, Scalar, TableError};
 use nalgebra::SVector;
 
 /// Observer, control law and actuator map of one gain table.
@@ -53,8 +53,9 @@ struct ActiveLaw<'t, const NX: usize, T: Scalar> {
 impl<'t, const NX: usize, T: Scalar> ActiveLaw<'t, NX, T> {
     fn new<const NY: usize>(table: &GainTable<NX, NY, T>, law: Law, gains: &'t LawGains<NX, T>) -> Self {
         let zero = T::default();
-        let has_memory = table.pending_acts != zero || gains.k_pending != zero || gains.k_integral != zero;
-        let is_plain = !has_memory && table.friction.is_none() && table.steps.is_none();
+        let has_memory =
+            table.drive.late().acts != zero || gains.k_pending != zero || gains.k_integral != zero;
+        let is_plain = !has_memory && table.friction.is_none() && table.drive.pulses().is_none();
         Self { law, gains, has_memory, is_plain }
     }
 }
@@ -308,7 +309,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// what it knows of the cart is what it was given, not what is measured.
     pub fn control_from_state(&mut self, x: &SVector<T, NX>) -> MotorCommand<T> {
         self.estimate = *x;
-        if matches!(self.mode, Mode::Stopped) || self.table.steps.is_some() {
+        if matches!(self.mode, Mode::Stopped) || self.table.drive.pulses().is_some() {
             return Self::off();
         }
         self.state.govern(self.target, self.active.gains.setpoint_step);
@@ -361,23 +362,25 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// Limits the force and converts it for the power stage.
     #[inline(always)]
     fn actuate(&mut self, requested: T) -> MotorCommand<T> {
-        if !self.active.is_plain
-            && let Some(steps) = &self.table.steps
-        {
-            return self.step(steps, requested);
-        }
-        let limited = saturate(requested, self.table.force_limit_n);
-        let (applied, drive) = match &self.table.motor {
-            None => (limited, Drive::Force(limited.to_f32())),
-            Some(motor) => {
-                let speed = self.speed();
-                let (volts, force) = motor.volts_and_force(limited, speed, self.last_volts);
-                self.last_volts = volts;
-                (force, Drive::Duty(motor.duty(volts).to_f32()))
+        let (applied, drive) = match &self.table.drive {
+            DriveMap::Force(force) => {
+                let limited = saturate(requested, force.limit_n);
+                (limited, Drive::Force(limited.to_f32()))
             }
+            DriveMap::Volts(motor) => self.drive_motor(motor, requested),
+            DriveMap::Pulses(steps) => return self.step(steps, requested),
         };
         self.applied = applied;
         MotorCommand { requested_n: requested, applied_n: applied, drive }
+    }
+
+    /// The force that a motor's voltage gives at the cart's speed (N), and its command.
+    #[inline(always)]
+    fn drive_motor(&mut self, motor: &MotorMap<T>, requested: T) -> (T, Drive) {
+        let limited = saturate(requested, motor.force.limit_n);
+        let (volts, force) = motor.volts_and_force(limited, self.speed(), self.last_volts);
+        self.last_volts = volts;
+        (force, Drive::Duty(motor.duty(volts).to_f32()))
     }
 
     /// Replaces the force of this tick by that of another controller on the same rig: requested and applied (N). Call
@@ -430,7 +433,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         if !self.active.has_memory {
             return self.applied;
         }
-        self.state.respond(self.table.pending_acts, self.table.pending_stays, self.applied)
+        self.state.respond(&self.table.drive.late(), self.applied)
     }
 
     /// The cart's speed (m/s), the state after its position.

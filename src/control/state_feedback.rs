@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use crate::table::Scalar;
+use crate::table::{Late, Scalar};
 
 /// State feedback with precompensation, `u = N r - K x` (the paper's control law).
 #[inline]
@@ -113,13 +113,13 @@ impl<T: Scalar> LawState<T> {
         }
     }
 
-    /// Ends a tick with the command `applied` (N); returns the mean force during the tick (N). The shares of the
-    /// pending force in it, and in the next pending force, are those of the table.
+    /// Ends a tick with the command `applied` (N), of which a part is `late`; returns the mean force during the tick
+    /// (N).
     #[inline]
-    pub fn respond(&mut self, pending_acts: T, pending_stays: T, applied: T) -> T {
+    pub fn respond(&mut self, late: &Late<T>, applied: T) -> T {
         let behind = self.pending - applied;
-        self.pending = applied + pending_stays * behind;
-        applied + pending_acts * behind
+        self.pending = applied + late.stays * behind;
+        applied + late.acts * behind
     }
 }
 

@@ -34,7 +34,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     ) -> Output {
         let table = self.table;
         (self.requested_n, self.applied_n) = (command.requested_n, command.applied_n);
-        let of_inputs = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs);
+        let of_inputs = self.debounce.check_inputs(&table.limits, table.drive.supply_max_v(), inputs);
         let of_force = self.debounce.check_force(&table.limits, command.requested_n != command.applied_n);
         if let Some(fault) = of_inputs.or(exceeded) {
             self.trip(fault, None);
@@ -43,7 +43,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         } else if let Some(fault) = of_force {
             self.trip(fault, None);
         } else {
-            return Output::on(command.drive, table.force_limit_n);
+            return Output::on(command.drive, &table.drive);
         }
         Output::OFF
     }

@@ -35,7 +35,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             return Output::OFF;
         }
         let pulses = self.slow_drive.pulses(steps, self.table.tick_s);
-        Output::on(Drive::Steps(pulses), self.table.force_limit_n)
+        Output::on(Drive::Steps(pulses), &self.table.drive)
     }
 
     /// Whether the drive has to let go of the cart at once, even if it moves.
@@ -52,7 +52,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     #[cold]
     #[inline(never)]
     pub(super) fn let_go(&mut self) {
-        if self.table.steps.is_some() {
+        if self.table.drive.pulses().is_some() {
             self.slow_drive.want(0.0);
             self.supervisor.lose_positions();
             self.calibration.forget_homing();
@@ -65,7 +65,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// # Errors
     /// [`WrongTravel`] if a switch is not where it should be.
     pub(super) fn drive_to_switches(&mut self, counts: &[i32; NY]) -> Result<bool, WrongTravel> {
-        let Some(steps) = &self.table.steps else { return Ok(true) };
+        let Some(steps) = self.table.drive.pulses() else { return Ok(true) };
         let (direction, left) = self.calibration.homing_way(cart(counts), &self.table.limits)?;
         let of_a_tick = HOMING_M_PER_S * self.table.tick_s / steps.step_m;
         let is_there = left.is_some_and(|left| (left.unsigned_abs() as f32) <= 1.0 + of_a_tick);
@@ -78,13 +78,13 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         self.slow_drive.want(share * JOG_M_PER_S);
         let pulses = self.slow_drive.pulses(steps, self.table.tick_s);
         self.slow_drive.want(0.0);
-        Output::on(Drive::Steps(pulses), self.table.force_limit_n)
+        Output::on(Drive::Steps(pulses), &self.table.drive)
     }
 
     /// The counts that show the direction of a jog: the cart's, or for a drive with pulses, which has no other sensor
     /// of the cart, those of the first link, which stays behind while it hangs.
     pub(super) fn answer_to_jog(&self, counts: &[i32; NY]) -> i32 {
-        if self.table.steps.is_none() {
+        if self.table.drive.pulses().is_none() {
             return cart(counts);
         }
         let link = counts.get(FIRST_LINK).copied().unwrap_or_default();
@@ -96,11 +96,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// How far the sensor that answers a jog has to move in the sign check (counts); 0 without a cart.
     pub(super) fn jog_sign_counts(&self) -> i32 {
         let signs = &self.table.limits.sign_counts;
-        signs.get(self.table.motor_sensor()).copied().unwrap_or_default()
+        signs.get(self.table.drive.witness()).copied().unwrap_or_default()
     }
 
     /// What keeps a drive with pulses from moving the cart to the switches.
     pub(super) fn homing_inhibits(&self) -> Inhibits {
-        if self.table.steps.is_some() { self.input_inhibits() } else { Inhibits::NONE }
+        if self.table.drive.pulses().is_some() { self.input_inhibits() } else { Inhibits::NONE }
     }
 }

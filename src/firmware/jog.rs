@@ -6,7 +6,7 @@ use crate::control::actuator::Drive;
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::supervisor::State;
-use crate::table::SwingUp;
+use crate::table::{DriveMap, SwingUp};
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// A command to jog: continues the jog in progress, or starts one, along +x or against it.
@@ -39,7 +39,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     pub(super) fn push_cart(&mut self, inputs: &Inputs<NY>) {
         let table = self.table;
         let counts = self.follow();
-        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
+        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.drive.supply_max_v(), inputs) {
             return self.trip(fault, None);
         }
         let answer = self.answer_to_jog(&counts);
@@ -50,12 +50,13 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     }
 
     fn jog_output(&mut self, share: f32) -> Output {
-        if let Some(steps) = &self.table.steps {
-            return self.jog_drive(share, steps);
-        }
         let force_n = share * self.table.limits.jog_force_n;
+        let drive = match &self.table.drive {
+            DriveMap::Force(_) => Drive::Force(force_n),
+            DriveMap::Volts(motor) => Drive::Duty(motor.duty_at_rest(force_n)),
+            DriveMap::Pulses(steps) => return self.jog_drive(share, steps),
+        };
         (self.requested_n, self.applied_n) = (force_n, force_n);
-        let drive = Drive::at_rest(force_n, self.table.motor.as_ref());
-        Output::on(drive, self.table.force_limit_n)
+        Output::on(drive, &self.table.drive)
     }
 }

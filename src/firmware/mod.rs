@@ -155,8 +155,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             controller,
             supervisor,
             calibration: Calibration::new(&table.limits),
-            jog: Jog::new(table.limits.sign_counts.get(table.motor_sensor()).copied().unwrap_or_default()),
-            detection: Detection::of_motor(table.motor_sensor()),
+            jog: Jog::new(table.limits.sign_counts.get(table.drive.witness()).copied().unwrap_or_default()),
+            detection: Detection::of_motor(table.drive.witness()),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
             swing_up_scan: ChecksumScan::default(),
@@ -198,7 +198,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// [`Info::tick_s`](crate::protocol::message::Info::tick_s) is that of the timer.
     pub(crate) fn compare_board(&mut self, timer_tick_s: f32, gives_pulses: bool) {
         let difference = f32::abs(timer_tick_s - self.table.tick_s);
-        let lacks_pulses = self.table.steps.is_some() && !gives_pulses;
+        let lacks_pulses = self.table.drive.pulses().is_some() && !gives_pulses;
         if lacks_pulses || difference.is_nan() || difference > TICK_TOLERANCE * self.table.tick_s {
             (self.timer_tick_s, self.is_usable) = (timer_tick_s, false);
             self.trip(Fault::Table, None);
@@ -294,7 +294,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         if !self.output.enable {
             (self.requested_n, self.applied_n) = (0.0, 0.0);
             self.controller.stop();
-            if let Some(steps) = &self.table.steps {
+            if let Some(steps) = self.table.drive.pulses() {
                 self.output = self.idle(steps);
             }
         }

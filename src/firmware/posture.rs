@@ -45,7 +45,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// Inhibits that follow from the contacts and the supply.
     pub(super) fn input_inhibits(&self) -> Inhibits {
         let Contacts { limit_low, limit_high, emergency_stop, driver_fault, .. } = self.contacts;
-        let supply_v = self.table.limits.supply_min_v..=self.table.supply_max_v();
+        let supply_v = self.table.limits.supply_min_v..=self.table.drive.supply_max_v();
         let supply_is_good = supply_v.contains(&self.supply_v) && self.supply_v.is_finite();
         Inhibits::LIMIT_SWITCH
             .when(limit_low || limit_high)

@@ -8,7 +8,7 @@ use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
 use crate::supervision::shaking::{FORCES, SPEED_SHARE, Shaking};
 use crate::supervision::supervisor::State;
-use crate::table::{StepMap, SwingUp};
+use crate::table::{DriveMap, StepMap, SwingUp};
 
 /// At the start, the cart has to be within this fraction of the rail's soft limits.
 const CENTRE: f32 = 0.25;
@@ -16,9 +16,7 @@ const CENTRE: f32 = 0.25;
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Begins to shake the rig. `id` is that of the command.
     pub(super) fn begin_shaking(&mut self, shaking: Shaking, id: u64) -> Answer {
-        let most =
-            self.table.steps.map_or(self.table.force_limit_n, |steps| steps.acceleration_limit_m_per_s2);
-        if !shaking.is_sound(most) {
+        if !shaking.is_sound(self.table.drive.largest_input()) {
             return Answer::Rejected(InvalidRequest::Shaking);
         }
         let counts = *self.controller.encoders().counts();
@@ -56,7 +54,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     pub(super) fn shake(&mut self, inputs: &Inputs<NY>) {
         let table = self.table;
         let counts = self.follow();
-        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.supply_max_v(), inputs) {
+        if let Some(fault) = self.debounce.check_inputs(&table.limits, table.drive.supply_max_v(), inputs) {
             return self.trip(fault, None);
         }
         let Some(observer) = &table.observer else { return self.supervisor.disarm() };
@@ -64,7 +62,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             Ok(Some(force_n)) => {
                 let (drive, applied_n) = self.actuate(force_n);
                 (self.requested_n, self.applied_n) = (force_n, applied_n);
-                self.output = Output::on(drive, self.table.force_limit_n);
+                self.output = Output::on(drive, &self.table.drive);
             }
             Ok(None) => self.supervisor.disarm(),
             Err((fault, sensor)) => self.trip(fault, sensor),
@@ -74,15 +72,20 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// The motor command for this force (N) on the moving cart, and the force that it produces (N); for a drive with
     /// pulses, those of an acceleration (m/s²).
     fn actuate(&mut self, force_n: f32) -> (Drive, f32) {
-        if let Some(steps) = &self.table.steps {
-            let most = SPEED_SHARE * self.table.limits.speed_m_per_s;
-            let map = StepMap { speed_limit_m_per_s: steps.speed_limit_m_per_s.min(most), ..*steps };
-            let (applied, pulses) = self.slow_drive.accelerate(force_n, &map, self.table.tick_s);
-            return (Drive::Steps(pulses), applied);
+        match &self.table.drive {
+            DriveMap::Force(_) => (Drive::Force(force_n), force_n),
+            DriveMap::Volts(motor) => {
+                let speed = self.shaker.speed_m_per_s();
+                let (volts, applied_n) = motor.volts_and_force(force_n, speed, self.last_volts);
+                self.last_volts = volts;
+                (Drive::Duty(motor.duty(volts)), applied_n)
+            }
+            DriveMap::Pulses(steps) => {
+                let most = SPEED_SHARE * self.table.limits.speed_m_per_s;
+                let map = StepMap { speed_limit_m_per_s: steps.speed_limit_m_per_s.min(most), ..*steps };
+                let (applied, pulses) = self.slow_drive.accelerate(force_n, &map, self.table.tick_s);
+                (Drive::Steps(pulses), applied)
+            }
         }
-        let Some(motor) = &self.table.motor else { return (Drive::Force(force_n), force_n) };
-        let (volts, applied_n) = motor.volts_and_force(force_n, self.shaker.speed_m_per_s(), self.last_volts);
-        self.last_volts = volts;
-        (Drive::Duty(motor.duty(volts)), applied_n)
     }
 }

@@ -389,7 +389,7 @@ fn a_drive_with_pulses_stays_off_on_a_board_that_gives_none() {
         speed_limit_m_per_s: 0.5,
         ..crate::table::StepMap::ideal(TICK_S)
     };
-    let mut table = GainTable { motor: None, steps: Some(map), pending_acts: 0.0, ..TABLE };
+    let mut table = GainTable { drive: crate::table::DriveMap::Pulses(map), ..TABLE };
     table.crc = table.checksum();
     assert_eq!(table.check(), Ok(()));
     assert_eq!(on_board::<false>(&table, TICK_S).0, Some(Fault::Table));
@@ -399,7 +399,7 @@ fn a_drive_with_pulses_stays_off_on_a_board_that_gives_none() {
 #[test]
 fn the_output_carries_the_duty_that_a_board_sets() {
     assert_eq!((Output::OFF.enable, Output::OFF.duty), (false, 0.0));
-    let output = Output::on(Drive::Force(-5.0), 20.0);
+    let output = Output::on(Drive::Force(-5.0), &TABLE.drive);
     assert_eq!((output.enable, output.duty), (true, -0.25));
-    assert_eq!(Output::on(Drive::Duty(0.5), 20.0).duty, 0.5);
+    assert_eq!(Output::on(Drive::Duty(0.5), &TABLE.drive).duty, 0.5);
 }

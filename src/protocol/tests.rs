@@ -116,7 +116,7 @@ fn lines() -> String {
         contacts: 5,
         supply_mv: 12_500,
         ticks: [
-            LoggedTick::new(&[-1, 2048], &Output::on(Drive::Duty(-0.5), 1.0)),
+            LoggedTick::new(&[-1, 2048], &Output::on(Drive::Duty(-0.5), &crate::gains::TABLE.drive)),
             LoggedTick { drive: OFF.to_le_bytes(), ..LoggedTick::new(&[0, 0], &Output::OFF) },
         ]
         .into_iter()

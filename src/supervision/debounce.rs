@@ -28,7 +28,7 @@ impl Debounce {
     }
 
     /// Checks the inputs of a tick with the motor on: limit switches, then the supply, then overruns. `supply_max_v`
-    /// is the highest supply voltage (V), see [`GainTable::supply_max_v`](crate::table::GainTable::supply_max_v).
+    /// is the highest supply voltage (V), see [`DriveMap::supply_max_v`](crate::table::DriveMap::supply_max_v).
     #[inline]
     pub fn check_inputs<const NY: usize>(
         &mut self,

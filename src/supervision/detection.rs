@@ -119,9 +119,9 @@ impl<const NY: usize> Default for Detection<NY> {
 }
 
 impl<const NY: usize> Detection<NY> {
-    /// Tests that have not begun, with the motor's test at this sensor: [`GainTable::motor_sensor`].
+    /// Tests that have not begun, with the motor's test at this sensor: [`DriveMap::witness`].
     ///
-    /// [`GainTable::motor_sensor`]: crate::table::GainTable::motor_sensor
+    /// [`DriveMap::witness`]: crate::table::DriveMap::witness
     pub fn of_motor(sensor: usize) -> Self {
         Self { motor_sensor: sensor as u8, ..Self::default() }
     }

@@ -3,15 +3,14 @@
 use crate::numbers::Scalar;
 use crate::table::absolute::AbsoluteZeros;
 use crate::table::checksum;
+use crate::table::drive::DriveMap;
 use crate::table::error::TableError;
 use crate::table::format::TABLE_FORMAT;
 use crate::table::friction::FrictionMap;
 use crate::table::law::{Law, LawGains, PerLaw};
 use crate::table::limits::Limits;
-use crate::table::motor::MotorMap;
 use crate::table::observer::ObserverGains;
 use crate::table::part::{is_finite, part};
-use crate::table::steps::StepMap;
 use crate::table::thresholds::Thresholds;
 
 part! {
@@ -31,24 +30,14 @@ part! {
         pub rig_hash: u64,
         /// Control period (s).
         pub tick_s: T,
-        /// Share of the pending force in the mean force of a tick: 0 for a force that acts at once, 1 if it acts a tick
-        /// later, `τ/T (1 - e^(-T/τ))` if it follows with the lag τ, and up to 1.2 with both.
-        pub pending_acts: T,
-        /// Share of the pending force that is still pending after a tick: `e^(-T/τ)` with the lag τ, 0 without.
-        pub pending_stays: T,
-        /// Largest force on the cart (N).
-        pub force_limit_n: T,
+        /// The drive of the cart.
+        pub drive: DriveMap<T>,
         /// Gains of the control laws that are designed, at least one.
         pub laws: PerLaw<Option<LawGains<NX, T>>>,
         /// The observer, if designed: without it the controller needs the whole state.
         pub observer: Option<ObserverGains<NX, NY, T>>,
         /// Known Coulomb friction, if there is any: it is compensated.
         pub friction: Option<FrictionMap<NX, NY, T>>,
-        /// The motor, if described: without it the controller gives a force.
-        pub motor: Option<MotorMap<T>>,
-        /// The drive, if it imposes the cart's acceleration: then that is the input of the plant instead of the force,
-        /// and `force_limit_n` limits nothing.
-        pub steps: Option<StepMap<T>>,
         /// Limits that the supervisor enforces.
         pub limits: Limits<NY>,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault.
@@ -67,18 +56,6 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         checksum::checksum(self)
     }
 
-    /// The sensor that shows what the motor does (0: cart, 1: first link …). The count of a drive with pulses is what
-    /// it was told, so that only the links show what it has done.
-    pub fn motor_sensor(&self) -> usize {
-        usize::from(self.steps.is_some())
-    }
-
-    /// Highest supply voltage of the power stage (V); no limit without motor data.
-    #[inline]
-    pub fn supply_max_v(&self) -> f32 {
-        self.motor.as_ref().map_or(f32::INFINITY, MotorMap::supply_max_v)
-    }
-
     /// Checks that the table is intact, plausible and of this version.
     ///
     /// # Errors
@@ -93,8 +70,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if self.crc != self.checksum() {
             return Err(TableError::Crc);
         }
-        // With delay and lag, the first one is above 1.
-        if [0.8 * self.pending_acts, self.pending_stays].iter().any(|share| !(0.0..=1.0).contains(share)) {
+        if !self.drive.late().is_sound() {
             return Err(TableError::Delay);
         }
         let mut measured = self.observer.iter().flat_map(|observer| &observer.measured);
@@ -104,11 +80,8 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if self.laws.present().next().is_none() {
             return Err(TableError::NoLaw);
         }
-        let is_sound = self.force_limit_n > 0.0
+        let is_sound = self.drive.is_sound()
             && self.laws.present().all(|(_, law)| law.is_sound())
-            && self.motor.iter().all(MotorMap::is_sound)
-            && self.steps.iter().all(StepMap::is_sound)
-            && !(self.steps.is_some() && (self.motor.is_some() || self.pending_acts > 0.0))
             && self.limits.is_sound()
             && self.thresholds.is_sound()
             && self

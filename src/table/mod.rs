@@ -10,7 +10,7 @@
 //! TABLE.check()?;
 //! assert!(TABLE.law(Law::Lqr).is_some());
 //! let mut damaged = TABLE;
-//! damaged.force_limit_n *= 2.0;
+//! damaged.tick_s *= 2.0;
 //! assert_eq!(damaged.check(), Err(TableError::Crc));
 //! # Ok::<(), TableError>(())
 //! ```
@@ -19,8 +19,10 @@ mod absolute;
 mod chain_model;
 pub mod checksum;
 mod columns;
+mod drive;
 mod equilibrium;
 mod error;
+mod force;
 mod format;
 mod friction;
 mod gain_table;
@@ -38,8 +40,10 @@ pub use absolute::AbsoluteZeros;
 pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
 pub use columns::columns;
+pub use drive::DriveMap;
 pub use equilibrium::Equilibrium;
 pub use error::TableError;
+pub use force::{ForceMap, Late};
 pub use format::TABLE_FORMAT;
 pub use friction::FrictionMap;
 pub use gain_table::GainTable;
@@ -49,7 +53,7 @@ pub use motor::MotorMap;
 pub use observer::ObserverGains;
 #[cfg(test)]
 pub(crate) use part::WordsMut;
-pub use part::{Part, Reader, Resize, Shape, Words};
+pub use part::{Part, Reader, Resize, Shape, Variant, Words};
 pub use steps::StepMap;
 pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
 pub use thresholds::{MotorTest, Thresholds};

@@ -1,11 +1,14 @@
 //! The motor, as seen by the cart.
 
+use crate::table::force::ForceMap;
 use crate::table::part::part;
 
 part! {
     /// A DC motor that drives the cart through a gear and a pulley.
     #[derive(Copy)]
     pub struct MotorMap<; T> {
+        /// The force that the voltages are for.
+        pub force: ForceMap<T>,
         /// Voltage per force at standstill, `R r / (efficiency gear Kt)` (V/N).
         pub volts_per_newton: T,
         /// Back-EMF per cart speed, `gear Ke / r` (V s/m).
@@ -19,16 +22,7 @@ part! {
     }
 }
 
-/// Highest supply voltage as a multiple of the table's. There, forces are larger by the same factor; most power stages
-/// and brake choppers have their limit above it.
-const OVER_VOLTAGE: f32 = 1.25;
-
 impl MotorMap {
-    /// Highest supply voltage of the power stage (V). A motor that brakes feeds its energy back and raises it.
-    pub fn supply_max_v(&self) -> f32 {
-        OVER_VOLTAGE * self.supply_v
-    }
-
     /// Whether every force maps to a voltage, and every voltage to a duty cycle.
     pub(crate) fn is_sound(&self) -> bool {
         self.volts_per_newton > 0.0 && self.supply_v > 0.0

@@ -1,6 +1,6 @@
-//! The structs of words that make up a gain table, each declared once by [`part!`].
+//! The structs and enums of words that make up a gain table, each declared once by [`part!`].
 //!
-//! The declaration generates the struct and everything that visits all of its fields: the checksum, the check for
+//! The declaration generates the type and everything that visits all of its fields: the checksum, the check for
 //! infinities and NaN, the writer of the source and the change of size. Exhaustive destructuring makes the compiler
 //! reject a forgotten field.
 
@@ -64,7 +64,7 @@ pub enum WordsMut<'a> {
     I32(&'a mut [i32]),
     /// Two words, the low one first.
     U64(&'a mut u64),
-    /// Words that cannot be changed here: whether an optional part is present, and those of a shared slice.
+    /// Words that cannot be changed here: which variant of an enum it is, and those of a shared slice.
     Fixed,
 }
 
@@ -84,10 +84,29 @@ pub enum Shape {
     },
 }
 
+/// A variant of an enum, or of an optional part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Variant {
+    /// What it is called in Rust, with the name of its enum.
+    pub name: &'static str,
+    /// Its number in the words of a table.
+    pub number: u32,
+    /// Whether it holds a part.
+    pub has_value: bool,
+}
+
+impl Variant {
+    /// What it is called, without the name of its enum.
+    pub fn last_name(&self) -> &'static str {
+        self.name.rsplit(':').next().unwrap_or(self.name)
+    }
+}
+
 /// A table or a part of one.
 pub trait Part {
     /// The words of leaf `at`, counted in the order of declaration. A part with fewer leaves subtracts their number
-    /// from `at` and returns `None`. An optional part is one word (1 or 0), followed by its contents if it is present.
+    /// from `at` and returns `None`. An enum is one word, the number of its variant, followed by what that holds; an
+    /// optional part is 1 and the part, or 0.
     fn part(&self, at: &mut usize) -> Option<Words<'_>>;
 
     /// The same as [`part`](Self::part), mutable.
@@ -109,8 +128,8 @@ pub trait Reader {
     /// The value of a field.
     fn words(&mut self, words: Words<'_>, shape: Shape);
 
-    /// The value of an optional field. If `is_there`, the value itself follows.
-    fn option(&mut self, is_there: bool);
+    /// The value of a field is this variant. If it has a value, that follows.
+    fn variant(&mut self, variant: Variant);
 
     /// The value of a field is a list of `length` structs, which follow.
     fn list(&mut self, length: usize);
@@ -283,9 +302,12 @@ impl<P: Part> Part for Option<P> {
     }
 
     fn read(&self, reader: &mut dyn Reader) {
-        reader.option(self.is_some());
-        if let Some(part) = self {
-            part.read(reader);
+        match self {
+            None => reader.variant(Variant { name: "None", number: 0, has_value: false }),
+            Some(part) => {
+                reader.variant(Variant { name: "Some", number: 1, has_value: true });
+                part.read(reader);
+            }
         }
     }
 }
@@ -310,7 +332,7 @@ pub(crate) fn is_finite(part: &impl Part) -> bool {
 
 /// `words` if `at` is 0; otherwise counts `at` down by this leaf.
 #[inline(always)]
-fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
+pub(crate) fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
     match at.checked_sub(1) {
         None => Some(words),
         Some(further) => {
@@ -324,6 +346,9 @@ fn leaf<W>(at: &mut usize, words: W) -> Option<W> {
 /// states, sensors or links and `OTHER` its name in the result of [`Resize`]. `SCALAR` is given if the host also uses
 /// the struct in another precision, `'t` if it holds slices. Every field needs documentation. A last field `sealed by
 /// NAME` is the checksum of the others.
+///
+/// `pub enum Name<SCALAR> { Variant(name: Part) = NUMBER, … }` declares a part of several kinds, of which each has a
+/// number in the table's words and may hold a part.
 macro_rules! part {
     (
         $(#[$attribute:meta])*
@@ -377,6 +402,60 @@ macro_rules! part {
                     $($field: $crate::table::part::Resize::resized($field),)+
                     $($seal: *$seal)?
                 }
+            }
+        }
+    };
+    (
+        $(#[$attribute:meta])*
+        pub enum $name:ident<$($scalar:ident)?> {
+            $($(#[doc = $doc:literal])+ $variant:ident $(($part:ident: $type:ty))? = $number:literal,)+
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum $name<$($scalar: $crate::table::Number = f32)?> {
+            $($(#[doc = $doc])+ $variant $(($type))?,)+
+        }
+
+        impl $crate::table::part::Part for $name {
+            fn part(&self, at: &mut usize) -> Option<$crate::table::part::Words<'_>> {
+                match self {
+                    $(Self::$variant $(($part))? => {
+                        $crate::table::part::leaf(at, $crate::table::part::Words::U32(&[$number]))
+                            $(.or_else(|| $crate::table::part::Part::part($part, at)))?
+                    })+
+                }
+            }
+
+            #[cfg(test)]
+            fn part_mut(&mut self, at: &mut usize) -> Option<$crate::table::part::WordsMut<'_>> {
+                match self {
+                    $(Self::$variant $(($part))? => {
+                        $crate::table::part::leaf(at, $crate::table::part::WordsMut::Fixed)
+                            $(.or_else(|| $crate::table::part::Part::part_mut($part, at)))?
+                    })+
+                }
+            }
+
+            fn read(&self, reader: &mut dyn $crate::table::part::Reader) {
+                match self {
+                    $(Self::$variant $(($part))? => {
+                        let held: &[&dyn Fn(&mut dyn $crate::table::part::Reader)] =
+                            &[$(&|reader| $crate::table::part::Part::read($part, reader))?];
+                        reader.variant($crate::table::part::Variant {
+                            name: concat!(stringify!($name), "::", stringify!($variant)),
+                            number: $number,
+                            has_value: !held.is_empty(),
+                        });
+                        held.iter().for_each(|read| read(reader));
+                    })+
+                }
+            }
+        }
+
+        impl $crate::table::part::Resize<Self> for $name {
+            fn resized(&self) -> Self {
+                *self
             }
         }
     };

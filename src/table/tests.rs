@@ -58,9 +58,14 @@ fn full() -> GainTable<4, 2> {
         output: 0,
         rig_hash: 0x0123_4567_89ab_cdef,
         tick_s: 0.01,
-        pending_acts: 0.75,
-        pending_stays: 0.5,
-        force_limit_n: next(),
+        drive: DriveMap::Volts(MotorMap {
+            force: ForceMap { limit_n: next(), late: Late { acts: 0.75, stays: 0.5 } },
+            volts_per_newton: next(),
+            volts_per_speed: next(),
+            dead_zone_v: next(),
+            slew_v_per_tick: next(),
+            supply_v: next(),
+        }),
         laws,
         observer: Some(ObserverGains {
             ad: SMatrix::from_fn(|_, _| next()),
@@ -74,14 +79,6 @@ fn full() -> GainTable<4, 2> {
             axes: SMatrix::from_fn(|_, _| next()),
             effect: SMatrix::from_fn(|_, _| next()),
         }),
-        motor: Some(MotorMap {
-            volts_per_newton: next(),
-            volts_per_speed: next(),
-            dead_zone_v: next(),
-            slew_v_per_tick: next(),
-            supply_v: next(),
-        }),
-        steps: None,
         limits: LIMITS,
         thresholds: THRESHOLDS,
         absolute: AbsoluteZeros { zero_counts: [-1, 17], still_counts: [1, 3] },
@@ -158,7 +155,9 @@ fn a_part_that_is_missing_or_moved_to_the_other_law_is_refused() {
     assert_eq!(refused(&|t| t.laws.lqr = None), crc);
     assert_eq!(refused(&|t| t.laws.pole_placement = None), crc);
     assert_eq!(refused(&|t| t.observer = None), crc);
-    assert_eq!(refused(&|t| t.motor = None), crc);
+    let of_motor = |drive: &DriveMap| *drive.force().unwrap();
+    assert_eq!(refused(&|t| t.drive = DriveMap::Force(of_motor(&t.drive))), crc);
+    assert_eq!(refused(&|t| t.drive = DriveMap::Pulses(StepMap::ideal(t.tick_s))), crc);
     assert_eq!(refused(&|t| core::mem::swap(&mut t.laws.lqr, &mut t.laws.pole_placement)), crc);
     let mut one = full();
     one.laws.lqr = None;
@@ -243,7 +242,7 @@ impl Reader for Names {
 
     fn words(&mut self, _: Words<'_>, _: Shape) {}
 
-    fn option(&mut self, _: bool) {}
+    fn variant(&mut self, _: Variant) {}
 
     fn list(&mut self, _: usize) {}
 

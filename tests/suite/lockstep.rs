@@ -1,6 +1,6 @@
 //! A run in lockstep with others gives the same bits as the run alone.
 
-use upright::table::Law;
+use upright::table::{DriveMap, ForceMap, Law};
 use upright_design::plant::{LANES, Plant, chain_lanes, chain_plant};
 use upright_design::rig::{PerJoint, Rig};
 use upright_design::simulate::{Fall, Job, Sample, Scenario, run, run_all};
@@ -81,7 +81,7 @@ fn runs_with_different_tables_are_in_one_lockstep() {
     let rig = rig("quadruple-paper");
     let table = table(&rig);
     let mut weaker = table.clone();
-    weaker.force_limit_n = 0.1;
+    weaker.drive = DriveMap::Force(ForceMap { limit_n: 0.1, late: weaker.drive.late() });
     let cases = random_plants(&rig, 4, 0.1);
     let tables = [&table, &weaker, &weaker, &table];
     let expected: Vec<Seen> = cases

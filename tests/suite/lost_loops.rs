@@ -133,7 +133,7 @@ fn balance_is_only_proved_by_a_push() {
 fn a_table_that_the_firmware_refuses_is_not_simulated() {
     let rig = rig("quadruple-paper");
     let mut damaged = table(&rig);
-    damaged.force_limit_n = f32::NAN;
+    damaged.tick_s = f32::NAN;
     let error = simulate(&rig, &damaged, &at_rest(&rig, Law::Lqr)).unwrap_err();
     assert_eq!(error, SimulationError::Table(TableError::Value));
 }

@@ -9,7 +9,8 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{
-    AbsoluteZeros, FrictionMap, GainTable, LawGains, Limits, ObserverGains, PerLaw, TABLE_FORMAT, Thresholds,
+    AbsoluteZeros, DriveMap, ForceMap, FrictionMap, GainTable, Late, LawGains, Limits, ObserverGains, PerLaw,
+    TABLE_FORMAT, Thresholds,
 };
 use upright_design::table::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_size};
 
@@ -42,7 +43,7 @@ fn model<const NX: usize>(pattern: Pattern, number: &mut impl FnMut() -> f32) ->
 fn table<const NX: usize, const NY: usize>(
     pattern: Pattern,
     in_order: bool,
-    [pending_acts, pending_stays]: [f32; 2],
+    [acts, stays]: [f32; 2],
     [integral, friction]: [bool; 2],
     numbers: &[f32],
 ) -> GainTable<NX, NY> {
@@ -56,13 +57,11 @@ fn table<const NX: usize, const NY: usize>(
         output: 0,
         rig_hash: 1,
         tick_s: 0.01,
-        pending_acts,
-        pending_stays,
-        force_limit_n: 3.0,
+        drive: DriveMap::Force(ForceMap { limit_n: 3.0, late: Late { acts, stays } }),
         laws: PerLaw {
             lqr: Some(LawGains {
                 k: SVector::from_fn(|_, _| number()),
-                k_pending: if pending_acts > 0.0 { number() } else { 0.0 },
+                k_pending: if acts > 0.0 { number() } else { 0.0 },
                 k_integral: if integral { number() } else { 0.0 },
                 n: number(),
                 setpoint_step: 0.125,
@@ -83,8 +82,6 @@ fn table<const NX: usize, const NY: usize>(
             axes: SMatrix::from_fn(|row, _| if row < 2 { number().abs() } else { number() }),
             effect: SMatrix::from_fn(|_, _| number()),
         }),
-        motor: None,
-        steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
         absolute: AbsoluteZeros::none(),
@@ -136,14 +133,14 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
         let requested = over(law.n * self.setpoint, 0) + over(-0.0, 1) + fed_forward
             - law.k_pending * self.pending
             - law.k_integral * self.integral;
-        let applied = saturate(requested, self.table.force_limit_n);
-        let behind = self.pending - applied;
-        let now = applied + self.table.pending_acts * behind;
+        let applied = saturate(requested, self.table.drive.largest_force_n());
+        let (behind, late) = (self.pending - applied, self.table.drive.late());
+        let now = applied + late.acts * behind;
         let moved = self.table.tick_s * (x[0] - self.setpoint);
         if law.k_integral != 0.0 && (requested - applied) * (-law.k_integral * moved) <= 0.0 {
             self.integral += moved;
         }
-        self.pending = applied + self.table.pending_stays * behind;
+        self.pending = applied + late.stays * behind;
         self.x = core::array::from_fn(|i| {
             let effect = |j: usize| self.table.friction.as_ref().map_or(-0.0, |map| map.effect[(i, j)]);
             let linear =

@@ -72,9 +72,8 @@ impl Feed {
         let excitation = Excitation::of(rig, duration_s, seed)?;
         let period_s = rig.tick.period_s;
         // The counts of a drive with pulses follow them whatever the cart does.
-        let is_moved = table.steps.is_some();
-        let limit_n =
-            table.steps.map_or(table.force_limit_n, |steps| steps.acceleration_limit_m_per_s2).into();
+        let is_moved = table.drive.pulses().is_some();
+        let limit_n = table.drive.largest_input().into();
         let pulse_n = if is_moved { 0.0 } else { f64::from(table.limits.jog_force_n).min(limit_n) };
         let ticks = (duration_s / period_s) as u32;
         let peak_n =

@@ -136,7 +136,7 @@ impl<'t> Shaken<'t> {
         let inputs = harness.inputs();
         // The line of a board has room for the log and a little telemetry. Of a drive with pulses, only telemetry says
         // whether it shakes the cart or holds it.
-        let telemetry_ticks = if table.steps.is_some() { 1 } else { ticks(rig, TELEMETRY_S) as u16 };
+        let telemetry_ticks = if table.drive.pulses().is_some() { 1 } else { ticks(rig, TELEMETRY_S) as u16 };
         harness.session.ask(Request::Telemetry(telemetry_ticks), &inputs)?;
         harness.session.ask(Request::Log(true), &inputs)?;
         harness.session.ask(feed.begin(), &inputs)?;

@@ -92,7 +92,7 @@ fn run(
             harness.session.send(Request::KeepAlive);
         }
         let pull = pull(f64::from(tick) * rig.tick.period_s, table, rounding);
-        match table.steps {
+        match table.drive.pulses() {
             Some(_) => harness.bench.pull(0.0, &[pull]),
             None => harness.bench.pull(pull, &[]),
         }
@@ -123,7 +123,8 @@ fn run(
 /// which need no function that machines compute differently.
 fn pull(t_s: f64, table: &TableValues, rounding: PullRounding) -> f64 {
     let wave = |period_s: f64| 2.0 * (2.0 * (t_s / period_s).fract() - 1.0).abs() - 1.0;
-    let unit = if table.steps.is_some() { 2e-4 } else { 0.002 * f64::from(table.force_limit_n) };
+    let unit =
+        if table.drive.pulses().is_some() { 2e-4 } else { 0.002 * f64::from(table.drive.largest_force_n()) };
     let [a, b, c] = [wave(1.3), wave(0.37), wave(0.11)].map(|wave| unit * wave);
     match rounding {
         PullRounding::AsWritten => a + b + c,

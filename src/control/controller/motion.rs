@@ -36,7 +36,7 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
         for ((k, x), planned) in reference.k.iter().zip(&self.estimate).zip(&reference.x) {
             requested -= k * (x - planned);
         }
-        let stays = self.table.pending_stays;
+        let stays = self.table.drive.late().stays;
         if stays != 0.0 {
             requested = (requested - stays * self.state.pending) / (1.0 - stays);
         }

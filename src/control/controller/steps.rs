@@ -8,7 +8,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> Controller<'_, NX, NY, T> {
     /// The step nearest to the position that the drive is commanded while the cart has the estimated position and
     /// speed; 0 without such a drive.
     pub(super) fn nearest_step(&self) -> i32 {
-        let steps = self.table.steps.as_ref();
+        let steps = self.table.drive.pulses();
         steps.and_then(|steps| steps.nearest(self.commanded(steps))).unwrap_or_default()
     }
 
@@ -30,7 +30,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> Controller<'_, NX, NY, T> {
     // Called in three places, and only without plain laws: one copy.
     #[inline(never)]
     pub(super) fn subtract_lead(&self, y: &mut [T; NY]) {
-        if let (Some(steps), Some(cart)) = (&self.table.steps, y.first_mut()) {
+        if let (Some(steps), Some(cart)) = (self.table.drive.pulses(), y.first_mut()) {
             *cart -= steps.lag_s * self.speed();
         }
     }
@@ -39,7 +39,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> Controller<'_, NX, NY, T> {
     /// drives, whose acceleration is constant.
     #[inline(never)]
     pub(super) fn cart_after_lag(&self) -> Option<T> {
-        let steps = self.table.steps.as_ref().filter(|steps| steps.lag_s > T::default())?;
+        let steps = self.table.drive.pulses().filter(|steps| steps.lag_s > T::default())?;
         let mean = self.speed() + self.applied * (steps.lead_s - steps.lag_s);
         Some(self.position() + mean * self.table.tick_s)
     }

@@ -2,9 +2,14 @@
 
 use super::*;
 use crate::table::{
-    AbsoluteZeros, Limits, ObserverGains, PerLaw, StepMap, TABLE_FORMAT, Thresholds, columns,
+    AbsoluteZeros, ForceMap, Late, Limits, ObserverGains, PerLaw, StepMap, TABLE_FORMAT, Thresholds, columns,
 };
 use nalgebra::{matrix, vector};
+
+/// A drive with this largest force, of which so much is late.
+fn force(limit_n: f32, acts: f32, stays: f32) -> DriveMap {
+    DriveMap::Force(ForceMap { limit_n, late: Late { acts, stays } })
+}
 
 /// A cart of 2 kg without friction, held for half a second.
 fn table() -> GainTable<2, 1> {
@@ -17,9 +22,7 @@ fn table() -> GainTable<2, 1> {
         output: 0,
         rig_hash: 7,
         tick_s: 0.5,
-        pending_acts: 1.0,
-        pending_stays: 0.0,
-        force_limit_n: 5.0,
+        drive: force(5.0, 1.0, 0.0),
         laws: PerLaw { lqr: Some(law), pole_placement: None },
         observer: Some(ObserverGains {
             ad: matrix![1.0, 0.5; 0.0, 1.0],
@@ -30,8 +33,6 @@ fn table() -> GainTable<2, 1> {
             step: vector![0.25],
         }),
         friction: None,
-        motor: None,
-        steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
         absolute: AbsoluteZeros::none(),
@@ -137,11 +138,11 @@ fn a_table_that_does_not_fit_is_refused() {
     assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
     assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
     assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
-    assert_eq!(refused(&|t| t.pending_acts = 2.0, true), Some(TableError::Delay));
-    assert_eq!(refused(&|t| t.pending_stays = -0.5, true), Some(TableError::Delay));
-    assert_eq!(refused(&|t| t.force_limit_n = f32::NAN, true), Some(TableError::Value));
+    assert_eq!(refused(&|t| t.drive = force(5.0, 2.0, 0.0), true), Some(TableError::Delay));
+    assert_eq!(refused(&|t| t.drive = force(5.0, 1.0, -0.5), true), Some(TableError::Delay));
+    assert_eq!(refused(&|t| t.drive = force(f32::NAN, 1.0, 0.0), true), Some(TableError::Value));
     assert_eq!(refused(&|t| t.laws.lqr = None, true), Some(TableError::NoLaw));
-    assert_eq!(refused(&|t| t.force_limit_n = 6.0, false), Some(TableError::Crc));
+    assert_eq!(refused(&|t| t.drive = force(6.0, 1.0, 0.0), false), Some(TableError::Crc));
 }
 
 /// A cart on a drive that takes pulses, with a law that follows the set-point fast.
@@ -170,11 +171,9 @@ fn stepping() -> GainTable<2, 1> {
     };
     let mut table = GainTable {
         tick_s,
-        pending_acts: 0.0,
-        force_limit_n: f32::MAX,
+        drive: DriveMap::Pulses(steps),
         laws: PerLaw { lqr: Some(law), pole_placement: None },
         observer: Some(observer),
-        steps: Some(steps),
         ..table()
     };
     table.crc = table.checksum();
@@ -185,7 +184,7 @@ fn stepping() -> GainTable<2, 1> {
 #[test]
 fn every_pulse_is_counted_after_ten_minutes_at_100_khz() {
     let table = stepping();
-    let step_m = f64::from(table.steps.unwrap().step_m);
+    let step_m = f64::from(table.drive.pulses().unwrap().step_m);
     let mut controller = Controller::new(&table, [CounterWidth::Bits32]).unwrap();
     controller.start(&[0]).unwrap();
     let (mut count, mut without_carry, mut most, mut random) = (0i32, 0i32, 0, 1u32);
@@ -219,7 +218,4 @@ fn pulses_need_a_state_that_is_a_number_and_no_measured_cart() {
     controller.start_in_state(&vector![f32::NAN, 0.0]);
     assert_eq!(controller.control(&[20_000]).drive, Drive::Steps(0));
     assert_eq!(controller.control_from_state(&vector![0.1, 0.0]).drive, Drive::OFF);
-    // A table with a motor, or with a delay, is none of such a drive.
-    let late = GainTable { pending_acts: 1.0, ..table };
-    assert_eq!(GainTable { crc: late.checksum(), ..late }.check(), Err(TableError::Value));
 }

@@ -11,7 +11,7 @@ use upright::supervision::detection::Detection;
 use upright::supervision::envelope;
 use upright::supervision::fault::Fault;
 use upright::supervision::slow_drive::SlowDrive;
-use upright::table::{Equilibrium, GainTable, Law};
+use upright::table::{DriveMap, Equilibrium, GainTable, Law, StepMap};
 use upright_design::export::c_header;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Bench, Scenario, StepDefect};
@@ -113,7 +113,7 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
         let upright = table.limits.unwound(controller.encoders().counts(), Equilibrium::UPRIGHT);
         controller.encoders_mut().home(raw, &upright);
         controller.start(raw).unwrap();
-        let mut detection = Detection::of_motor(table.motor_sensor());
+        let mut detection = Detection::of_motor(table.drive.witness());
         detection.start(controller.encoders().counts(), &controller.positions().data.0[0]);
         Self { table, controller, detection, debounce: Debounce::default(), fault: None }
     }
@@ -137,7 +137,7 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
                 brake.take_over(self.controller.estimate()[1]);
             }
             is_on = brake.is_moving();
-            pulses = self.table.steps.as_ref().map_or(0, |steps| brake.pulses(steps, self.table.tick_s));
+            pulses = self.table.drive.pulses().map_or(0, |steps| brake.pulses(steps, self.table.tick_s));
         }
         let numbers = [command.requested_n, command.applied_n, self.controller.law_state().setpoint];
         let estimate = self.controller.estimate().iter().chain(self.controller.innovation().iter());
@@ -194,7 +194,8 @@ fn a_speed_limit_that_is_left_out_and_a_pulse_that_is_lost_are_noticed() {
     assert!(differing(&run, &replayed(&forgetful, STRICT, &run.input)) > 100);
     // A drive that is hardly fast enough for the step of the set-point.
     let mut slow = table.clone();
-    slow.steps.as_mut().unwrap().speed_limit_m_per_s = 0.03;
+    let steps = *slow.drive.pulses().unwrap();
+    slow.drive = DriveMap::Pulses(StepMap { speed_limit_m_per_s: 0.03, ..steps });
     let header = c_header(rig, &slow).unwrap();
     let run = recorded_steps(rig, &slow, &scenario(rig, Law::Lqr, 2000), nothing);
     assert_eq!(differing(&run, &replayed(&header, STRICT, &run.input)), 0);

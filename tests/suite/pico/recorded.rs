@@ -124,10 +124,10 @@ pub(crate) fn recorded_while<D: FnMut(&mut Pins)>(
             defect,
             client: Client::default(),
             since: None,
-            pulses: table.steps.map(|_| 0),
+            pulses: table.drive.pulses().map(|_| 0),
             run,
         };
-        let supply_v = table.motor.map_or(0.0, |motor| motor.supply_v);
+        let supply_v = table.drive.supply_v().unwrap_or_default();
         let hanging = healthy(&vec![0; table.sensors()], supply_v);
         for _ in 0..WARM_UP_TICKS {
             tap.tick(&hanging, &mut Vec::new()).unwrap();

@@ -6,7 +6,7 @@ use upright::gains::TABLE;
 use super::chip::BLOCKS;
 
 /// Whether the drive of the gain table takes pulses.
-pub(super) const GIVES_PULSES: bool = TABLE.steps.is_some();
+pub(super) const GIVES_PULSES: bool = TABLE.drive.pulses().is_some();
 
 /// Phase B of each encoder, from the cart's on; phase A is the next pin.
 pub(super) const ENCODERS: [usize; 5] = [0, 2, 4, 6, 8];

@@ -8,7 +8,7 @@ use upright::control::encoder::{AbsoluteSensor, is_at_end};
 use upright::protocol::frame::DELIMITER;
 use upright::protocol::message::{Command, Request};
 use upright::protocol::simulated_pins::BAD_SAMPLE;
-use upright::table::Thresholds;
+use upright::table::{DriveMap, Thresholds};
 
 use super::defect::Defect;
 use super::expected::Phase;
@@ -87,9 +87,9 @@ impl AbsoluteReading {
 /// Largest force of a push (N): the motor's; on a rig whose cart goes where its pulses say, a twentieth of its links'
 /// weight.
 pub fn push_limit_n(rig: &Rig, table: &TableValues) -> f64 {
-    match rig.chain().filter(|_| table.steps.is_some()) {
+    match rig.chain().filter(|_| table.drive.pulses().is_some()) {
         Some(chain) => 0.05 * chain.gravity_m_per_s2 * chain.links_mass_kg(),
-        None => f64::from(table.force_limit_n),
+        None => f64::from(table.drive.largest_force_n()),
     }
 }
 
@@ -240,17 +240,16 @@ impl<'a> Injection<'a> {
         }
         let (Drive::Force(command) | Drive::Duty(command)) = &mut output.drive else { return false };
         let asked = *command;
-        let full = if self.table.motor.is_some() { 1.0 } else { self.full_force_n as f32 };
+        let (full, force_per_command) = match &self.table.drive {
+            DriveMap::Volts(motor) => (1.0, f64::from(motor.supply_v / motor.volts_per_newton)),
+            _ => (self.full_force_n as f32, 1.0),
+        };
         *command = match self.trial.kind {
             Defect::MotorDead => 0.0,
             Defect::MotorReversed => -asked,
             Defect::MotorStuck => full * self.trial.sign as f32,
             Defect::MotorWeak => asked * (0.1 + 0.4 * self.trial.size as f32),
             _ => return false,
-        };
-        let force_per_command = match &self.table.motor {
-            Some(motor) => f64::from(motor.supply_v / motor.volts_per_newton),
-            None => 1.0,
         };
         let missing_n = f64::from(asked - *command) * force_per_command;
         let Some(observer) = &self.table.observer else { return false };
@@ -263,7 +262,7 @@ impl<'a> Injection<'a> {
     /// What is wrong, `since` ticks after the onset, with a drive that takes pulses.
     pub fn step_defect(&self, since: usize) -> Option<StepDefect> {
         let Trial { kind, size, .. } = self.trial;
-        self.table.steps?;
+        self.table.drive.pulses()?;
         match kind {
             Defect::MotorDead => Some(StepDefect::Off),
             Defect::CartJammed => Some(StepDefect::Jammed),
@@ -284,7 +283,9 @@ impl<'a> Injection<'a> {
             Some(StepDefect::Off | StepDefect::Jammed) => 1.0,
             Some(StepDefect::Misses(share)) => share,
         };
-        let (Some(steps), Some(observer)) = (&self.table.steps, &self.table.observer) else { return false };
+        let (Some(steps), Some(observer)) = (self.table.drive.pulses(), &self.table.observer) else {
+            return false;
+        };
         self.missing[0] += share * f64::from(pulses) * f64::from(steps.step_m);
         // The link turns by this for each metre that the cart has gone (rad/m).
         let turns = observer.bd.get(3).map_or(0.0, |&rate| f64::from(rate / self.table.tick_s));

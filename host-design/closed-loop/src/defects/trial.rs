@@ -47,13 +47,13 @@ impl Defect {
     pub fn is_possible(self, table: &TableValues) -> bool {
         match self {
             Self::SupplySag | Self::SupplyDip => table.limits.supply_min_v > 0.0,
-            Self::SupplySurge | Self::SupplySpike => table.motor.is_some(),
+            Self::SupplySurge | Self::SupplySpike => table.drive.supply_v().is_some(),
             Self::LinkEncoderFrozen => table.sensors() > 1,
             Self::EncodersSwapped => table.sensors() > 1 + first_encoder(table),
             // The board counts the pulses that it gives.
-            Self::CartEncoderFrozen | Self::MotorStuck | Self::MotorWeak => table.steps.is_none(),
+            Self::CartEncoderFrozen | Self::MotorStuck | Self::MotorWeak => table.drive.pulses().is_none(),
             Self::CartJammed | Self::PulsesMissing | Self::SomePulsesMissing | Self::StepsLost => {
-                table.steps.is_some()
+                table.drive.pulses().is_some()
             }
             kind if kind.is_of_some_sensors() => {
                 (0..table.sensors()).any(|sensor| kind.can_have(table, sensor))
@@ -82,7 +82,7 @@ pub(super) fn able(kind: Defect, table: &TableValues, sensor: usize) -> usize {
 
 /// Number of the first sensor that is an encoder: a drive with pulses has none at the cart.
 pub(super) fn first_encoder(table: &TableValues) -> usize {
-    usize::from(table.steps.is_some())
+    usize::from(table.drive.pulses().is_some())
 }
 
 impl Trial {

@@ -62,7 +62,7 @@ impl<'t> Harness<'t> {
             operator,
             output: Output::OFF,
             counters: vec![0; table.sensors()],
-            supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
+            supply_v: table.drive.supply_v().unwrap_or_default(),
             period_s: rig.tick.period_s,
             asked: None,
             begun: Vec::new(),

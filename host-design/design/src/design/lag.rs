@@ -51,7 +51,7 @@ pub(super) fn force_last<R: Real>(k: &Matrix<R>) -> Matrix<R> {
 }
 
 /// The shares of the pending force, [in the mean force of a tick, left for the next tick], with ticks of `period_s`,
-/// see [`GainTable`](upright::table::GainTable).
+/// see [`Late`](upright::table::Late).
 ///
 /// A force with a lag that begins a tick later would need two pending forces. One that has the same mean delay and the
 /// same mean square of it is exact to the second order of `s`: its first share is a little above 1.

@@ -25,7 +25,7 @@ pub struct DetectionDesign {
     pub motor: Option<MotorDesign>,
 }
 
-/// Constants of the motor's test, at the sensor [`motor_sensor`](upright::table::GainTable::motor_sensor).
+/// Constants of the motor's test, at the sensor [`witness`](upright::table::DriveMap::witness).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorDesign {
     /// Dynamics of the error of predicted position and speed, [a_pp, a_pv, a_vp, a_vv].

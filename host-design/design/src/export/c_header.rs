@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use upright::control::observer::PredictionPattern;
 use upright::supervision::jumps::furthest_counts;
-use upright::table::{Law, LawGains, ObserverGains};
+use upright::table::{DriveMap, Law, LawGains, ObserverGains};
 
 use super::absolute::Readings;
 use super::initializer::Initializer;
@@ -41,7 +41,7 @@ pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
     let observer = table.observer.as_ref().ok_or(NoHeader::NoObserver)?;
     let name = plain(&rig.name);
     let title = format!("Controller of the rig \"{name}\", written by `upright export --c`; do not edit.");
-    let steps = if table.steps.is_some() { STEPS } else { "" };
+    let steps = if table.drive.pulses().is_some() { STEPS } else { "" };
     let readings = Readings::of(rig);
     let absolute = readings.comment();
     let mut out = format!("/* {title}\n\n{HEAD}{}{absolute}{steps}*/\n\n", calling::comment());
@@ -55,7 +55,7 @@ pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
         initializer(table, observer, &readings)
     );
     out.push_str(STATE);
-    out += &faults::functions(table.steps.is_some());
+    out += &faults::functions(table.drive.pulses().is_some());
     out.push_str(READINGS);
     out.push_str(PARTS);
     out.push_str(if table.thresholds.survives_pushes() { TESTS_OF_PUSHES } else { TESTS_OF_SIZES });
@@ -89,16 +89,16 @@ fn constants(out: &mut String, name: &str, table: &TableValues, is_absolute: boo
     define("OUTPUT", table.output.to_string())?;
     let is_late = table.observer.as_ref().is_some_and(has_delay);
     define("HAS_DELAY", u8::from(is_late).to_string())?;
-    define("HAS_PENDING", u8::from(table.pending_acts != 0.0).to_string())?;
+    define("HAS_PENDING", u8::from(table.drive.late().acts != 0.0).to_string())?;
     define("LAWS", laws.len().to_string())?;
     for (index, law) in laws.into_iter().enumerate() {
         define(&law.key().to_uppercase(), index.to_string())?;
     }
-    define("HAS_MOTOR", u8::from(table.motor.is_some()).to_string())?;
-    define("HAS_STEPS", u8::from(table.steps.is_some()).to_string())?;
+    define("HAS_MOTOR", u8::from(table.drive.supply_v().is_some()).to_string())?;
+    define("HAS_STEPS", u8::from(table.drive.pulses().is_some()).to_string())?;
     define(
         "MOTOR_SENSOR",
-        format!("{} /* whose innovation shows what the motor does */", table.motor_sensor()),
+        format!("{} /* whose innovation shows what the motor does */", table.drive.witness()),
     )?;
     define("HAS_PUSHES", u8::from(table.thresholds.survives_pushes()).to_string())?;
     define("HAS_FRICTION", u8::from(table.friction.is_some()).to_string())?;
@@ -121,10 +121,11 @@ fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readin
         law(&mut out, gains, states);
     }
     out.line("    },");
-    out.float("force_limit_n", table.force_limit_n);
-    if table.pending_acts != 0.0 {
-        out.float("pending_acts", table.pending_acts);
-        out.float("pending_stays", table.pending_stays);
+    out.float("force_limit_n", table.drive.largest_force_n());
+    let late = table.drive.late();
+    if late.acts != 0.0 {
+        out.float("pending_acts", late.acts);
+        out.float("pending_stays", late.stays);
     }
     let column = |values: &[f32]| values[..states].to_vec();
     out.columns("ad", observer.ad.data.0[..states].iter().map(|values| column(values)));
@@ -140,20 +141,7 @@ fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readin
         out.columns("friction", friction.axes.data.0[..sensors].iter().map(axis));
         out.columns("friction_effect", friction.effect.data.0[..sensors].iter().map(|values| column(values)));
     }
-    if let Some(motor) = &table.motor {
-        out.float("volts_per_newton", motor.volts_per_newton);
-        out.float("volts_per_speed", motor.volts_per_speed);
-        out.float("dead_zone_v", motor.dead_zone_v);
-        out.float("slew_v_per_tick", motor.slew_v_per_tick);
-        out.float("supply_v", motor.supply_v);
-    }
-    if let Some(steps) = &table.steps {
-        out.float("step_m", steps.step_m);
-        out.float("acceleration_limit_m_per_s2", steps.acceleration_limit_m_per_s2);
-        out.float("speed_limit_m_per_s", steps.speed_limit_m_per_s);
-        out.float("lag_s", steps.lag_s);
-        out.float("lead_s", steps.lead_s);
-    }
+    drive(&mut out, &table.drive);
     supervision(&mut out, table);
     out.indices("measured", &observer.measured[..sensors]);
     out.counts("slow_counts", &table.limits.slow_counts[..sensors]);
@@ -165,6 +153,27 @@ fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readin
     out.counts("furthest_counts", &furthest[..sensors]);
     readings.initialise(&mut out);
     out.sealed()
+}
+
+/// How the drive gives the force, or moves the cart.
+fn drive(out: &mut Initializer, drive: &DriveMap) {
+    match drive {
+        DriveMap::Force(_) => {}
+        DriveMap::Volts(motor) => {
+            out.float("volts_per_newton", motor.volts_per_newton);
+            out.float("volts_per_speed", motor.volts_per_speed);
+            out.float("dead_zone_v", motor.dead_zone_v);
+            out.float("slew_v_per_tick", motor.slew_v_per_tick);
+            out.float("supply_v", motor.supply_v);
+        }
+        DriveMap::Pulses(steps) => {
+            out.float("step_m", steps.step_m);
+            out.float("acceleration_limit_m_per_s2", steps.acceleration_limit_m_per_s2);
+            out.float("speed_limit_m_per_s", steps.speed_limit_m_per_s);
+            out.float("lag_s", steps.lag_s);
+            out.float("lead_s", steps.lead_s);
+        }
+    }
 }
 
 fn law(out: &mut Initializer, gains: &LawGains<MAX_STATES>, states: usize) {

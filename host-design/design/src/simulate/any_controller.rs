@@ -118,7 +118,7 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
     }
 
     fn supervise(&mut self) {
-        let detection = Detection::of_motor(self.table.motor_sensor());
+        let detection = Detection::of_motor(self.table.drive.witness());
         let mut supervision = BalancingSupervision { detection, ..BalancingSupervision::default() };
         let positions = self.controller.positions();
         supervision.detection.start(self.controller.encoders().counts(), &positions.data.0[0]);

@@ -2,7 +2,7 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use upright::table::checksum::crc32;
-use upright::table::{Part, Reader, Shape, Words};
+use upright::table::{Part, Reader, Shape, Variant, Words};
 
 use super::any_size::{MAX_SENSORS, MAX_STATES, WidestTable};
 
@@ -19,8 +19,8 @@ pub(super) enum TableNode {
     Columns(Vec<Vec<TableNumber>>),
     /// A struct.
     Struct(&'static str, Vec<Field>),
-    /// A struct that may be missing.
-    Optional(Option<Box<TableNode>>),
+    /// A variant of an enum, as it is written in Rust, with what it holds.
+    Variant(Variant, Option<Box<TableNode>>),
     /// A list of structs.
     Structs(Vec<TableNode>),
 }
@@ -71,7 +71,7 @@ fn trim(node: &mut TableNode, length: &dyn Fn(usize) -> usize) {
             columns.iter_mut().for_each(|column| column.truncate(length(column.len())));
         }
         TableNode::Struct(_, fields) => fields.iter_mut().for_each(|field| trim(&mut field.value, length)),
-        TableNode::Optional(node) => node.iter_mut().for_each(|node| trim(node, length)),
+        TableNode::Variant(_, node) => node.iter_mut().for_each(|node| trim(node, length)),
         TableNode::Structs(nodes) => nodes.iter_mut().for_each(|node| trim(node, length)),
         TableNode::Value(_) | TableNode::Slice(_) => {}
     }
@@ -92,7 +92,7 @@ fn all_bytes(fields: &[Field]) -> Vec<u8> {
     fields.iter().flat_map(|field| bytes_of(&field.value)).collect()
 }
 
-/// The words of `node`. An optional struct is one word, 1 or 0, and its fields if it is there.
+/// The words of `node`. A variant is one word, its number, and the words of what it holds.
 fn bytes_of(node: &TableNode) -> Vec<u8> {
     let of = |numbers: &[TableNumber]| numbers.iter().flat_map(TableNumber::bytes).collect();
     match node {
@@ -100,9 +100,8 @@ fn bytes_of(node: &TableNode) -> Vec<u8> {
         TableNode::List(numbers) | TableNode::Slice(numbers) => of(numbers),
         TableNode::Columns(columns) => of(&columns.concat()),
         TableNode::Struct(_, fields) => all_bytes(fields),
-        TableNode::Optional(node) => {
-            let is_there = TableNumber::Integer(node.is_some().into()).bytes();
-            is_there.into_iter().chain(node.iter().flat_map(|node| bytes_of(node))).collect()
+        TableNode::Variant(Variant { number, .. }, node) => {
+            number.to_le_bytes().into_iter().chain(node.iter().flat_map(|node| bytes_of(node))).collect()
         }
         TableNode::Structs(nodes) => nodes.iter().flat_map(bytes_of).collect(),
     }
@@ -112,8 +111,8 @@ fn bytes_of(node: &TableNode) -> Vec<u8> {
 struct Builder {
     /// Open structs, innermost last.
     open: Vec<(&'static str, Vec<Field>)>,
-    /// Fields still without a value, each with whether it is optional; innermost last.
-    waiting: Vec<(&'static str, Vec<&'static str>, bool)>,
+    /// Fields still without a value, each with its variant if that holds the value; innermost last.
+    waiting: Vec<(&'static str, Vec<&'static str>, Option<Variant>)>,
     /// Open lists of structs, innermost last: the number of structs that are open around the list, the number of its
     /// structs that are still missing, and those that are complete.
     lists: Vec<(usize, usize, Vec<TableNode>)>,
@@ -138,13 +137,16 @@ impl Builder {
             self.complete_list();
             return;
         }
-        let (Some((_, fields)), Some((name, documentation, is_optional))) =
+        let (Some((_, fields)), Some((name, documentation, variant))) =
             (self.open.last_mut(), self.waiting.pop())
         else {
             self.done = Some(node);
             return;
         };
-        let value = if is_optional { TableNode::Optional(Some(Box::new(node))) } else { node };
+        let value = match variant {
+            Some(variant) => TableNode::Variant(variant, Some(Box::new(node))),
+            None => node,
+        };
         fields.push(Field { name, documentation, value });
     }
 
@@ -162,7 +164,7 @@ impl Reader for Builder {
     }
 
     fn field(&mut self, name: &'static str, documentation: &[&'static str]) {
-        self.waiting.push((name, documentation.to_vec(), false));
+        self.waiting.push((name, documentation.to_vec(), None));
     }
 
     fn words(&mut self, words: Words<'_>, shape: Shape) {
@@ -181,13 +183,10 @@ impl Reader for Builder {
         });
     }
 
-    fn option(&mut self, is_there: bool) {
-        if is_there {
-            if let Some((_, _, is_optional)) = self.waiting.last_mut() {
-                *is_optional = true;
-            }
-        } else {
-            self.value(TableNode::Optional(None));
+    fn variant(&mut self, variant: Variant) {
+        match self.waiting.last_mut() {
+            Some((_, _, waiting)) if variant.has_value => *waiting = Some(variant),
+            _ => self.value(TableNode::Variant(variant, None)),
         }
     }
 
@@ -214,7 +213,8 @@ impl TableNumber {
     }
 }
 
-/// As JSON: a vector is an array, a matrix is an array of its rows, a missing struct is null.
+/// As JSON: a vector is an array, a matrix is an array of its rows, a missing struct is null, and a variant is its
+/// name, or an object of its name and what it holds.
 impl Serialize for TableNode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -229,7 +229,9 @@ impl Serialize for TableNode {
                 }
             },
             TableNode::Struct(_, fields) => object(fields.iter(), serializer),
-            TableNode::Optional(node) => node.serialize(serializer),
+            TableNode::Variant(Variant { name: "Some" | "None", .. }, node) => node.serialize(serializer),
+            TableNode::Variant(variant, None) => serializer.serialize_str(variant.last_name()),
+            TableNode::Variant(variant, Some(node)) => serializer.collect_map([(variant.last_name(), node)]),
             TableNode::Structs(nodes) => serializer.collect_seq(nodes),
         }
     }

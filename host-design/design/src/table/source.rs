@@ -181,10 +181,11 @@ impl Writer<'_> {
             TableNode::Struct(kind, fields) => {
                 self.block(&format!("{name}: {kind} {{"), |writer| writer.fields(fields), "},")
             }
-            TableNode::Optional(None) => self.line(&format!("{name}: None,")),
-            TableNode::Optional(Some(node)) => match &**node {
+            TableNode::Variant(variant, None) => self.line(&format!("{name}: {},", variant.name)),
+            TableNode::Variant(variant, Some(node)) => match &**node {
                 TableNode::Struct(kind, fields) => {
-                    self.block(&format!("{name}: Some({kind} {{"), |writer| writer.fields(fields), "}),")
+                    let opening = format!("{name}: {}({kind} {{", variant.name);
+                    self.block(&opening, |writer| writer.fields(fields), "}),")
                 }
                 _ => Err(core::fmt::Error),
             },

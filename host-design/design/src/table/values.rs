@@ -5,7 +5,8 @@ use core::ops::{Deref, DerefMut};
 use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use upright::table::{
-    GainTable, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize, StepMap, TABLE_FORMAT,
+    DriveMap, ForceMap, GainTable, Late, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize,
+    StepMap, TABLE_FORMAT,
 };
 
 use super::any_size::{MAX_SENSORS, MAX_STATES, WidestTable, WithSize, widest, with_size};
@@ -95,7 +96,6 @@ impl TableValues {
         let steps = double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, double);
         let friction = friction::friction_map(rig, double)?;
-        let [pending_acts, pending_stays] = shares(rig, rig.tick.period_s);
         let widest = GainTable {
             format: TABLE_FORMAT,
             states: states as u32,
@@ -103,26 +103,10 @@ impl TableValues {
             output: rig.output() as u32,
             rig_hash: rig.hash(),
             tick_s: finite("tick.period_s", rig.tick.period_s as f32)?,
-            pending_acts: pending_acts as f32,
-            pending_stays: pending_stays as f32,
-            force_limit_n: rig
-                .force_limit_n()
-                .map_or(Ok(f32::MAX), |limit| finite("actuator.force_limit_n", limit as f32))?,
+            drive: drive_map(rig)?,
             laws,
             observer: single.kalman.as_ref().map(|kalman| observer(rig, single, kalman)),
             friction,
-            motor: rig
-                .actuator
-                .motor
-                .as_ref()
-                .map(|motor| motor_map(motor, rig.tick.period_s))
-                .transpose()?,
-            steps: rig
-                .actuator
-                .acceleration
-                .as_ref()
-                .map(|drive| step_map(drive, rig.tick.period_s))
-                .transpose()?,
             limits: supervision::limits(rig, steps)?,
             thresholds: supervision::thresholds(detection.as_ref()),
             absolute: supervision::absolute_zeros(rig, steps),
@@ -312,6 +296,20 @@ fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> 
     })
 }
 
+fn drive_map(rig: &Rig) -> Result<DriveMap, NoTable> {
+    let (actuator, period_s) = (&rig.actuator, rig.tick.period_s);
+    if let Some(drive) = &actuator.acceleration {
+        return Ok(DriveMap::Pulses(step_map(drive, period_s)?));
+    }
+    let [acts, stays] = shares(rig, period_s).map(|share| share as f32);
+    let limit_n = rig.force_limit_n().map_or(Ok(f32::MAX), |n| finite("actuator.force_limit_n", n as f32))?;
+    let force = ForceMap { limit_n, late: Late { acts, stays } };
+    Ok(match &actuator.motor {
+        Some(motor) => DriveMap::Volts(motor_map(motor, force, period_s)?),
+        None => DriveMap::Force(force),
+    })
+}
+
 /// The drive with pulses as the controller sees it, with ticks of `period_s`: travel per pulse (m), limits (m/s², m/s),
 /// lag and lead (s).
 ///
@@ -332,9 +330,10 @@ pub fn step_map(drive: &AccelerationDrive, period_s: f64) -> Result<StepMap, NoT
     })
 }
 
-fn motor_map(motor: &Motor, period_s: f64) -> Result<MotorMap, NoTable> {
+fn motor_map(motor: &Motor, force: ForceMap, period_s: f64) -> Result<MotorMap, NoTable> {
     let volts_per_newton = motor.resistance_before_bridge_ohm() / motor.newtons_per_amp();
     Ok(MotorMap {
+        force,
         volts_per_newton: finite("the motor's voltage per force", volts_per_newton as f32)?,
         volts_per_speed: finite("the motor's voltage per speed", motor.volts_per_speed() as f32)?,
         dead_zone_v: finite("actuator.dead_zone_v", motor.dead_zone_v as f32)?,

@@ -47,8 +47,8 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "soft_m": table.limits.rail_m,
         "setpoints_m": table.limits.setpoints_m(),
         "angle_limit_rad": table.limits.angle_rad,
-        "force_limit_n": table.force_limit_n,
-        "input": if table.steps.is_some() { ["Acceleration", "m/s²"] } else { ["Force", "N"] },
+        "force_limit_n": table.drive.largest_force_n(),
+        "input": if table.drive.pulses().is_some() { ["Acceleration", "m/s²"] } else { ["Force", "N"] },
         "step": table.observer.as_ref()
             .map(|observer| observer.step.iter().take(table.sensors()).copied().collect::<Vec<_>>()),
         "sensors": (0..table.sensors()).map(|sensor| words::joint(sensor as u8)).collect::<Vec<_>>(),

@@ -70,7 +70,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
             During::Balancing => {}
             // Movement of the cart, or of the first link, that is needed to determine the motor's sign.
             During::Jog => {
-                let sensor = blind.motor_sensor();
+                let sensor = blind.drive.witness();
                 blind.limits.sign_counts[sensor] = 0;
             }
             During::Shaking(_) => blind_while_shaken(&mut blind),
@@ -210,7 +210,7 @@ impl DefectRun<'_> {
 
     /// Whether telemetry says that a drive with pulses has stopped following the control law.
     fn stops(&self, session: &Session<'_>) -> bool {
-        self.table.steps.is_some() && !session.status().state.controls()
+        self.table.drive.pulses().is_some() && !session.status().state.controls()
     }
 
     /// Number of ticks since it has stopped: a board has telemetry of some ticks only.
@@ -362,7 +362,7 @@ impl DefectRun<'_> {
     fn power_up(&self, target: &mut dyn Target) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut session = Session::new(target);
-        let supply_v = self.table.motor.map_or(24.0, |motor| motor.supply_v);
+        let supply_v = self.table.drive.supply_v().unwrap_or(24.0);
         let pins = healthy(&vec![0; self.table.sensors()], supply_v);
         match session.ask(Request::Arm, &pins) {
             Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => {

@@ -54,7 +54,7 @@ impl DefectRun<'_> {
                 }
                 continue;
             };
-            let was_told = self.table.steps.is_some() && output.enable;
+            let was_told = self.table.drive.pulses().is_some() && output.enable;
             observed.output(tick, output, is_on, was_told.into());
             observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
             if observed.off.is_some() {
@@ -72,7 +72,7 @@ impl DefectRun<'_> {
     /// its pulses say.
     fn move_rig(&self, harness: &mut Harness<'_>, output: &Output, held: &mut [f64], is_free: bool) {
         let is_free = is_free && output.enable;
-        if is_free || self.table.steps.is_some() {
+        if is_free || self.table.drive.pulses().is_some() {
             harness.bench.tick(output.drive);
             held[0] = harness.bench.state()[0];
         }
@@ -83,7 +83,7 @@ impl DefectRun<'_> {
 
     /// Whether the motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
     fn is_jogging(&self, session: &Session<'_>, output: &Output) -> bool {
-        output.enable && (self.table.steps.is_none() || session.status().state == State::Jogging)
+        output.enable && (self.table.drive.pulses().is_none() || session.status().state == State::Jogging)
     }
 
     /// Checks the signs by hand, and lets the links hang still, wherever the cart is; returns that state.

@@ -159,7 +159,7 @@ fn of_fault(
 ) -> Class {
     // On a board, inputs take effect a tick later: an overrun is counted in the next tick, volts and bytes take time.
     // Telemetry, which tells that a drive with pulses only holds the cart, may wait a tick for the log.
-    let waits = phase == Phase::Shaken && table.steps.is_some();
+    let waits = phase == Phase::Shaken && table.drive.pulses().is_some();
     let limit = allowed(table, within) + u32::from(on_board) + u32::from(waits);
     match (ticks, observed.fault) {
         _ if observed.outside => Class::Missed,

@@ -74,7 +74,7 @@ impl DefectRun<'_> {
             let output = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive))?;
             // A drive with pulses also holds the cart and brings it to rest, which does not count.
             let state = shaken.harness.session.status().state;
-            let is_shaken = self.table.steps.is_none() || state == State::Identifying;
+            let is_shaken = self.table.drive.pulses().is_none() || state == State::Identifying;
             let before = usize::from(output.enable && !is_shaken);
             observed.output(tick, output, output.enable && is_shaken, before);
             observed.outside |= observed.off.is_none() && self.is_out_of_bounds(shaken.harness.bench.state());
@@ -98,7 +98,7 @@ impl DefectRun<'_> {
 
     /// The drive that acts on the cart, which the defect may change.
     fn acting(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
-        let mut acting = upright::board::Output::on(drive, self.table.force_limit_n);
+        let mut acting = upright::board::Output::on(drive, &self.table.drive);
         if let Some(since) = since {
             injection.output(since, &mut acting);
         }

@@ -38,7 +38,7 @@ impl LargestMotion {
 
 /// The links are raised by hand, the motor comes on, the hand lets go, and the rig balances.
 pub(super) fn balance(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
-    let is_moved = plan.table.steps.is_some();
+    let is_moved = plan.table.drive.pulses().is_some();
     guide.ask(PersonTask::Centre)?;
     guide.pause(Duration::from_secs(1))?;
     guide.ask(PersonTask::Raise)?;

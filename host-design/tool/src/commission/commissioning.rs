@@ -74,7 +74,7 @@ impl<'a> Commissioning<'a> {
                 guide.turn_off();
             }
             guide.journal.end(result.as_ref().err().map(ToString::to_string))?;
-            let back = step.back(self.plan.table.steps.is_some());
+            let back = step.back(self.plan.table.drive.pulses().is_some());
             match result {
                 Ok(()) => next += 1,
                 Err(Stop::Machine(_)) if guide.machine.again(step, back) => {

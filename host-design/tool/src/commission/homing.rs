@@ -30,7 +30,7 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
     let is_begun = |now: &AnyTelemetry| matches!(now.homing, Homing::Touch { .. });
     guide.request_until(Request::HomeRail, is_begun)?;
     let mut ends = Vec::new();
-    let is_driven = plan.table.steps.is_some();
+    let is_driven = plan.table.drive.pulses().is_some();
     if is_driven {
         guide.ask(PersonTask::HandsOff)?;
     }
@@ -70,7 +70,7 @@ pub(super) fn home(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<()
 /// Between the switches, the links come to rest, and the rig is homed.
 fn rest_between(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
     let is_homed = |now: &AnyTelemetry| (now.homing == Homing::Homed).then_some(());
-    let homed = if plan.table.steps.is_some() {
+    let homed = if plan.table.drive.pulses().is_some() {
         // It goes to the middle by itself, and homes as soon as the links hang still.
         guide.ask(PersonTask::Rest)?;
         guide.wait(longest(plan), is_homed)?
@@ -96,7 +96,7 @@ fn longest(plan: CommissionPlan<'_>) -> Duration {
 /// the other.
 fn wrong_travel(plan: CommissionPlan<'_>, moved: &[f64]) -> String {
     let wanted = f64::from(plan.table.limits.travel_counts[0]);
-    if plan.table.steps.is_some() {
+    if plan.table.drive.pulses().is_some() {
         return format!(
             "a limit switch does not open where it should: {:.4} m of pulses so far, {:.4} m between the switches in the file: \
              does the drive move the cart, and along +x for positive pulses? Else correct step_m or travel_m",

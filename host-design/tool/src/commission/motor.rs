@@ -22,7 +22,7 @@ const LONGEST: Duration = Duration::from_millis(1_500);
 
 /// The motor pushes the cart along +x until it has moved a little.
 pub(super) fn check(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(), Stop> {
-    if plan.table.steps.is_some() {
+    if plan.table.drive.pulses().is_some() {
         // The links show the direction: they must not swing.
         guide.ask(PersonTask::Rest)?;
         guide.pause(STILL)?;

@@ -76,7 +76,7 @@ impl<'a> Simulated<'a> {
             wires: planted.map(|planted| DefectWires::new(&machine, table, &scenario, planted)),
             output: Output::OFF,
             counters: vec![0; table.sensors()],
-            supply_v: table.motor.map_or(0.0, |motor| motor.supply_v),
+            supply_v: table.drive.supply_v().unwrap_or_default(),
             rail: RailEnds::of(&machine),
             pulse_m: machine.actuator.acceleration.as_ref().map(|drive| drive.step_m),
             period_s: machine.tick.period_s,

@@ -23,7 +23,7 @@ pub const PROFILE: &str = "firmware";
 /// # Errors
 /// [`BuildError`] if the board cannot serve the table's rig, there is no compiler, or it fails.
 pub fn build(board: BoardName) -> Result<PathBuf, BuildError> {
-    check_board(board, SENSORS, f64::from(TICK_S), TABLE.steps.as_ref())?;
+    check_board(board, SENSORS, f64::from(TICK_S), TABLE.drive.pulses())?;
     compile(board, None, board.name())
 }
 
@@ -32,7 +32,7 @@ pub fn build(board: BoardName) -> Result<PathBuf, BuildError> {
 /// # Errors
 /// As for [`build`].
 pub fn build_for(board: BoardName, rig: &Rig, table: &TableValues) -> Result<PathBuf, BuildError> {
-    check_board(board, table.sensors(), rig.tick.period_s, table.steps.as_ref())?;
+    check_board(board, table.sensors(), rig.tick.period_s, table.drive.pulses())?;
     reads_all(board, table)?;
     let source = gains_source(rig, table);
     // An included file cannot have module documentation.

@@ -36,7 +36,7 @@ pub fn check_rig_for_pico(board: PicoBoard, rig: &Rig) -> Result<(), PicoError> 
 /// # Errors
 /// [`BuildError`] if the board cannot run this rig, there is no compiler, or it fails.
 pub fn build_pico(board: PicoBoard, rig: &Rig, table: &TableValues) -> Result<PicoImage, BuildError> {
-    check(board, table.sensors(), rig.tick.period_s, table.swing_up.is_some(), table.steps.as_ref())?;
+    check(board, table.sensors(), rig.tick.period_s, table.swing_up.is_some(), table.drive.pulses())?;
     counts_all(table)?;
     let name = format!(
         "{}-{:016x}-{:08x}-{:08x}",

@@ -35,7 +35,8 @@ impl LawCost {
         };
         // Voltage from force and speed, compensation of the dead zone, duty.
         let motor = Operations { multiplications: 4, additions: 4 };
-        let parts = [(&law, true), (&observer, table.observer.is_some()), (&motor, table.motor.is_some())];
+        let parts =
+            [(&law, true), (&observer, table.observer.is_some()), (&motor, table.drive.supply_v().is_some())];
         let used: Vec<&Operations> =
             parts.into_iter().filter(|(_, used)| *used).map(|(part, _)| part).collect();
         let multiply_adds = used.iter().map(|part| part.multiplications).sum();

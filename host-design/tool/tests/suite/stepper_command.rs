@@ -59,7 +59,7 @@ fn check_design_simulate_and_export_serve_a_stepper() {
     let out = folder.path().join("gains.rs");
     let design = upright(&["design", &rig, "--out", out.to_str().unwrap()]);
     assert_eq!(status(&design), 0, "{}", stderr(&design));
-    assert!(std::fs::read_to_string(&out).unwrap().contains("steps: Some(StepMap {"));
+    assert!(std::fs::read_to_string(&out).unwrap().contains("drive: DriveMap::Pulses(StepMap {"));
     let simulated = upright(&["simulate", &rig, "--step", "0.05"]);
     assert_eq!(status(&simulated), 0, "{}", stderr(&simulated));
     assert!(stdout(&simulated).contains("m/s²"), "{}", stdout(&simulated));

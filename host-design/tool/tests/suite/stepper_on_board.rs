@@ -8,7 +8,7 @@ use std::rc::Rc;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
-use upright::table::Law;
+use upright::table::{DriveMap, Law};
 use upright_board::{Conditions, Image, Input, Pulse, Time, UNITS_PER_MICROSECOND as US, seconds};
 use upright_closed_loop::harness::{Harness, RailEnds, Recording, record};
 use upright_design::rig::Rig;
@@ -163,7 +163,9 @@ fn every_pulse_of_a_stepper_is_the_hosts_and_in_its_place() {
 
         // Negative controls: a host with another limit, and one pulse fewer in a tick.
         let mut other = table.clone();
-        other.steps.as_mut().unwrap().acceleration_limit_m_per_s2 *= 0.01;
+        let mut steps = *table.drive.pulses().unwrap();
+        steps.acceleration_limit_m_per_s2 *= 0.01;
+        other.drive = DriveMap::Pulses(steps);
         let mut board = VirtualBoard::start(&image, &Conditions::f405(1), table).unwrap();
         let error = run_compared(rig, &other, &moving(rig, 2.0), &mut board).unwrap_err().to_string();
         assert!(error.contains("differ"), "{error}");

@@ -129,7 +129,7 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
     rig.tick.delay_ticks = 1;
     rig.integral = Some(Integral { position_weight: 100.0, setpoint_weight: 1.0 });
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    assert!(table.motor.is_some() && table.sensors() == 2);
+    assert!(table.drive.supply_v().is_some() && table.sensors() == 2);
     let Some(elf) = built_for(BoardName::WeactF405, &rig, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     for law in Law::ALL {
@@ -171,7 +171,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
         let mut session = Session::new(&mut board);
         let pins = Pins {
             raw_counts: heapless::Vec::from_slice(&[0; 2]).unwrap(),
-            supply_v: table.motor.unwrap().supply_v,
+            supply_v: table.drive.supply_v().unwrap(),
             contacts: Default::default(),
             received: heapless::Vec::new(),
             injected_fault: None,

@@ -82,6 +82,7 @@ impl<R: Real> Numbers<R> {
         let (states, sensors) = (table.states(), table.sensors());
         let exact = |x: f32| R::from_f64(f64::from(x));
         let column = |x: &LawVector| Matrix::from_fn(states, 1, |i, _| exact(x[i]));
+        let late = table.drive.late();
         Some(Self {
             k: column(&values.k).transpose(),
             k_pending: exact(values.k_pending),
@@ -96,7 +97,7 @@ impl<R: Real> Numbers<R> {
             c: measurement(table),
             output: table.output as usize,
             tick_s: exact(table.tick_s),
-            pending: [exact(table.pending_acts), exact(table.pending_stays)],
+            pending: [exact(late.acts), exact(late.stays)],
         })
     }
 
@@ -229,7 +230,7 @@ impl<R: Real> ControllerModel<R> {
     /// x̂⁻⁺ = Ad x̂ + Bd (α u_pending + (1-α) u),   z⁺ = z + T x̂_output,   u_pending⁺ = β u_pending + (1-β) u
     /// ```
     ///
-    /// α and β are `pending_acts` and `pending_stays` of the table.
+    /// α and β are `acts` and `stays` of the table's [`Late`](upright::table::Late).
     pub(crate) fn of(numbers: &Numbers<R>) -> Self {
         let (s, p) = (numbers.k.cols(), numbers.c.rows());
         let [acts, stays] = &numbers.pending;

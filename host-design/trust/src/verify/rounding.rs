@@ -6,7 +6,8 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{
-    AbsoluteZeros, FrictionMap, GainTable, Law, LawGains, Limits, ObserverGains, PerLaw, Thresholds,
+    AbsoluteZeros, DriveMap, ForceMap, FrictionMap, GainTable, Late, Law, LawGains, Limits, ObserverGains,
+    PerLaw, Thresholds,
 };
 
 use super::loop_model::{LoopModel, Numbers, seen_plant};
@@ -143,6 +144,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         n: exact.n,
         setpoint_step: f64::MAX,
     });
+    let [acts, stays] = exact.pending;
     let observer = table.observer.as_ref().zip(exact.observer.as_ref());
     GainTable {
         format: table.format,
@@ -151,9 +153,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         output: table.output,
         rig_hash: table.rig_hash,
         tick_s: exact.tick_s,
-        pending_acts: exact.pending[0],
-        pending_stays: exact.pending[1],
-        force_limit_n: f64::MAX,
+        drive: DriveMap::Force(ForceMap { limit_n: f64::MAX, late: Late { acts, stays } }),
         laws,
         observer: observer.map(|(single, exact)| ObserverGains {
             ad: widest(&exact.ad),
@@ -167,8 +167,6 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
             axes: single.axes.map(f64::from),
             effect: single.effect.map(f64::from),
         }),
-        motor: None,
-        steps: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
         absolute: AbsoluteZeros::none(),
@@ -226,8 +224,9 @@ impl<'t> Shadow<'t> {
 
     /// The force that the firmware assumes to be applied (N): its actuator map applied to its own requested force.
     fn applied(&mut self, sample: &Sample<&[f64]>) -> f64 {
-        let limited = saturate(sample.requested as f32, self.table.force_limit_n);
-        let Some(motor) = &self.table.motor else { return f64::from(limited) };
+        let drive = &self.table.drive;
+        let limited = saturate(sample.requested as f32, drive.largest_force_n());
+        let DriveMap::Volts(motor) = drive else { return f64::from(limited) };
         let speed = sample.estimate.get(1).copied().unwrap_or_default() as f32;
         let (volts, force) = motor.volts_and_force(limited, speed, self.last_volts);
         self.last_volts = volts;

@@ -23,7 +23,7 @@ use super::wiring::{Signal, wire_of};
 use crate::CYCLES_PER_TICK;
 
 /// Whether the drive of the gain table takes pulses, which `steps.rs` gives in place of the PWM.
-pub(super) const GIVES_PULSES: bool = TABLE.steps.is_some();
+pub(super) const GIVES_PULSES: bool = TABLE.drive.pulses().is_some();
 
 /// Approximate PWM frequency (Hz): above hearing.
 const PWM_HZ: u32 = 20_000;

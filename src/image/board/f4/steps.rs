@@ -30,7 +30,7 @@ const REST: u32 = {
 const CYCLES: u32 = CYCLES_PER_TICK - REST;
 
 const _: () = {
-    if let Some(steps) = &TABLE.steps {
+    if let Some(steps) = TABLE.drive.pulses() {
         let rate = steps.speed_limit_m_per_s / steps.step_m;
         let tick_s = CYCLES_PER_TICK as f32 / super::CLOCK_HZ as f32;
         // Positions are rounded, so a tick may have a pulse more than its speed needs.

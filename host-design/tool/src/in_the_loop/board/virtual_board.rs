@@ -119,14 +119,14 @@ impl VirtualBoard {
         let mut board =
             SimulatedBoard::power_on(image, conditions, RULES).map_err(|error| stopped(image, error))?;
         let stage = board.power_stage();
-        let pulses = table.steps.map(|_| PulseCount::default());
+        let pulses = table.drive.pulses().map(|_| PulseCount::default());
         if pulses.is_some() {
             board.record_pulses();
         }
         let mut target = Self {
             board,
             wiring: conditions.wiring,
-            force_limit_n: table.motor.is_none().then_some(table.force_limit_n),
+            force_limit_n: table.drive.supply_v().is_none().then_some(table.drive.largest_force_n()),
             pulses,
             tick_s: f64::from(table.tick_s),
             positions: vec![0; table.sensors()],
@@ -148,7 +148,7 @@ impl VirtualBoard {
         target.turn(&vec![0; table.sensors()]);
         target.counters = None;
         target.connect(&Contacts::default());
-        target.supply(table.motor.map_or(24.0, |motor| motor.supply_v));
+        target.supply(table.drive.supply_v().unwrap_or(24.0));
         at_power_up.iter().for_each(|&input| target.board.apply(input));
         while target.board.next_tick().is_none() {
             target.run(target.board.now() + 100 * UNITS_PER_MICROSECOND)?;
