@@ -184,8 +184,8 @@ fn request(which: u8, mut next: impl FnMut() -> u8) -> Request {
         15 => Request::Telemetry(u16::from_le_bytes([next(), next()])),
         28 => Request::Log(next().is_multiple_of(2)),
         29 => {
-            let [most_n, stiffness_n_per_m, damping_n_s_per_m] = core::array::from_fn(|_| setpoint(next()));
-            Request::Shake(Shaking { most_n, stiffness_n_per_m, damping_n_s_per_m })
+            let [largest_input, stiffness, damping] = core::array::from_fn(|_| setpoint(next()));
+            Request::Shake(Shaking { largest_input, stiffness, damping })
         }
         _ => Request::Jog { along: next().is_multiple_of(2) },
     }

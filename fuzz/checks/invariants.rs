@@ -24,7 +24,7 @@ pub(crate) struct Invariants {
     /// Tick in which arming was last refused because of a latched fault, or soon after one.
     arm_held_at: Option<u32>,
     /// Largest force while the rig is shaken (N).
-    most_n: f32,
+    largest_input: f32,
 }
 
 /// Arming needs this many slow ticks.
@@ -33,7 +33,14 @@ const SLOW_TICKS: usize = TABLE.limits.arm_ticks as usize / 4;
 impl Invariants {
     pub(crate) fn new(firmware: &Tested) -> Self {
         let (state, cause) = (firmware.state(), firmware.cause());
-        Self { state, cause, tick: 0, counts: VecDeque::new(), arm_held_at: None, most_n: SHAKING.most_n }
+        Self {
+            state,
+            cause,
+            tick: 0,
+            counts: VecDeque::new(),
+            arm_held_at: None,
+            largest_input: SHAKING.largest_input,
+        }
     }
 
     /// Checks a tick; `answered` is the request that was answered in it, with the answer.
@@ -80,9 +87,9 @@ impl Invariants {
         }
         if enable && before == State::Identifying {
             assert!(
-                matches!(drive, Drive::Force(force) if force.abs() <= self.most_n),
+                matches!(drive, Drive::Force(force) if force.abs() <= self.largest_input),
                 "shaken with {drive:?}, at most {} N are asked for",
-                self.most_n
+                self.largest_input
             );
         }
         if enable {
@@ -134,7 +141,7 @@ impl Invariants {
                 self.nothing_against_jogging(firmware, rig);
             }
             Some((Request::Shake(shaking), Answer::Done)) => {
-                self.most_n = shaking.most_n;
+                self.largest_input = shaking.largest_input;
                 assert!(
                     matches!(self.state, State::Calibrated | State::Homing),
                     "shaken in {:?}",

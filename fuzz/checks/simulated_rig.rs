@@ -14,7 +14,7 @@ use upright::supervision::supervisor::State;
 use upright::table::NoSwingUp;
 
 /// How the rig is shaken in the starting state `shaken`.
-pub(crate) const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 5.0, damping_n_s_per_m: 2.0 };
+pub(crate) const SHAKING: Shaking = Shaking { largest_input: 2.0, stiffness: 5.0, damping: 2.0 };
 
 /// A hand moves cart and links by this many counts in a tick: further would be a counter that jumps.
 const COUNTS_PER_TICK: i32 = 100;

@@ -30,7 +30,7 @@ fn frame(message: &impl serde::Serialize) -> String {
 }
 
 fn requests() -> Vec<Request> {
-    let shaking = Shaking { most_n: 2.5, stiffness_n_per_m: 30.0, damping_n_s_per_m: 4.0 };
+    let shaking = Shaking { largest_input: 2.5, stiffness: 30.0, damping: 4.0 };
     let mut forces = [0; FORCES];
     (forces[0], forces[FORCES - 1]) = (1, -1);
     std::vec![

@@ -240,8 +240,8 @@ impl<const NY: usize> Detection<NY> {
     }
 
     /// Second half of a tick: stores the corrected estimate of the sensors' positions (m or rad) and the force `u` (N)
-    /// that acts during this tick. Where a hand may push, it also does what the next output need not wait for: it notes
-    /// which counters stand still, and tests the motor, whose fault then comes in the next tick.
+    /// that acts during this tick. Where a hand may push, the tests of frozen counters and of the motor are made here,
+    /// after the output; a fault of the motor then comes in the next tick.
     #[inline]
     pub fn finish_tick(
         &mut self,
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_survives_still_while_the_model_moves_is_found() {
+    fn a_counter_that_stands_still_while_the_model_moves_is_found() {
         assert_eq!(frozen(0.4), Some((10, finding(Fault::Frozen, 1))));
         assert_eq!(frozen(-0.4), Some((10, finding(Fault::Frozen, 1))));
         // A small steady error of the model is no alarm, however long it lasts.

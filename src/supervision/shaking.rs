@@ -54,20 +54,20 @@ const IMPULSE: f32 = 1.0 / 32.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shaking {
     /// Largest force (N); for a drive with pulses, largest acceleration of the cart (m/s²).
-    pub most_n: f32,
+    pub largest_input: f32,
     /// Stiffness of the spring that pulls the cart to the middle (N/m, or 1/s²).
-    pub stiffness_n_per_m: f32,
+    pub stiffness: f32,
     /// Constant of the damper on the cart (N·s/m, or 1/s).
-    pub damping_n_s_per_m: f32,
+    pub damping: f32,
 }
 
 impl Shaking {
     /// Whether the largest force is positive and at most `force_limit_n` (N, or m/s²), and both constants are finite
     /// and not negative.
     pub fn is_sound(&self, force_limit_n: f32) -> bool {
-        let constants = [self.stiffness_n_per_m, self.damping_n_s_per_m];
-        self.most_n > 0.0
-            && self.most_n <= force_limit_n
+        let constants = [self.stiffness, self.damping];
+        self.largest_input > 0.0
+            && self.largest_input <= force_limit_n
             && constants.iter().all(|constant| (0.0..f32::MAX).contains(constant))
     }
 }
@@ -170,12 +170,13 @@ impl<const NY: usize> Shaker<NY> {
                 return Ok(None);
             }
         }
-        let Shaking { most_n, stiffness_n_per_m, damping_n_s_per_m } = self.shaking;
-        let wanted = most_n * f32::from(pushed) / f32::from(FULL)
-            - stiffness_n_per_m * position_m
-            - damping_n_s_per_m * self.speed_m_per_s;
-        let change = saturate(saturate(wanted, most_n) - self.force_n, SLEW_PER_S * tick_s * most_n);
-        self.force_n = saturate(self.force_n + change, most_n);
+        let Shaking { largest_input, stiffness, damping } = self.shaking;
+        let wanted = largest_input * f32::from(pushed) / f32::from(FULL)
+            - stiffness * position_m
+            - damping * self.speed_m_per_s;
+        let change =
+            saturate(saturate(wanted, largest_input) - self.force_n, SLEW_PER_S * tick_s * largest_input);
+        self.force_n = saturate(self.force_n + change, largest_input);
         if self.force_n.is_finite() { Ok(Some(self.force_n)) } else { Err((Fault::NotFinite, None)) }
     }
 
@@ -242,7 +243,7 @@ mod tests {
 
     const TICK_S: f32 = 0.001;
     const STEP: [f32; 3] = [1e-4, 1e-3, 1e-3];
-    const SHAKING: Shaking = Shaking { most_n: 2.0, stiffness_n_per_m: 1.0, damping_n_s_per_m: 1.0 };
+    const SHAKING: Shaking = Shaking { largest_input: 2.0, stiffness: 1.0, damping: 1.0 };
 
     /// Counts of cart and links as functions of the tick, and for how many ticks the host sends full force along +x.
     struct Run {
@@ -292,10 +293,10 @@ mod tests {
         assert!(rising[..9].iter().zip(1..).all(|(force, n)| (force - 0.2 * n as f32).abs() < 1e-5));
         // Nothing more was sent: back to 0.
         assert!(rising[9] < rising[8] && rising[10] < rising[9]);
-        assert!(!Shaking { most_n: 3.0, ..SHAKING }.is_sound(2.0) && SHAKING.is_sound(2.0));
-        assert!(!Shaking { damping_n_s_per_m: f32::NAN, ..SHAKING }.is_sound(2.0));
-        assert!(!Shaking { stiffness_n_per_m: f32::INFINITY, ..SHAKING }.is_sound(2.0));
-        assert!(!Shaking { most_n: f32::NAN, ..SHAKING }.is_sound(2.0));
+        assert!(!Shaking { largest_input: 3.0, ..SHAKING }.is_sound(2.0) && SHAKING.is_sound(2.0));
+        assert!(!Shaking { damping: f32::NAN, ..SHAKING }.is_sound(2.0));
+        assert!(!Shaking { stiffness: f32::INFINITY, ..SHAKING }.is_sound(2.0));
+        assert!(!Shaking { largest_input: f32::NAN, ..SHAKING }.is_sound(2.0));
     }
 
     #[test]

@@ -83,7 +83,7 @@ fn machines_of_a_study_are_within_the_tolerances_and_their_alarms_are_counted() 
     for number in 0..50 {
         let reality = drawn_machine(&tolerating, number).reality;
         assert!(reality.parameters.cart_mass_percent.abs() <= 5.0, "{reality:?}");
-        assert!((0.0..=3e-2).contains(&reality.friction.joint_friction_n_m.of(0)), "{reality:?}");
+        assert!((0.0..=3e-2).contains(&reality.friction.joint_friction_n_m.of_joint(0)), "{reality:?}");
     }
     assert_ne!(drawn_machine(&tolerating, 1), drawn_machine(&tolerating, 2));
     let count = |rig: &Rig| {
@@ -106,12 +106,16 @@ fn machines_at_the_corners_have_every_combination_of_wrong_masses_and_all_of_the
     assert_eq!(Machines::Corners.count(&tolerating), 8);
     let masses = |machine: &Rig| {
         let parameters = &machine.reality.parameters;
-        [parameters.cart_mass_percent, parameters.link_mass_percent.of(0), parameters.link_mass_percent.of(1)]
+        [
+            parameters.cart_mass_percent,
+            parameters.link_mass_percent.of_joint(0),
+            parameters.link_mass_percent.of_joint(1),
+        ]
     };
     assert_eq!(masses(&machines[0]), [-5.0, -5.0, -5.0]);
     assert_eq!(masses(&machines[6]), [-5.0, 5.0, 5.0]);
     for (number, machine) in machines.iter().enumerate() {
-        assert_eq!(machine.reality.friction.joint_friction_n_m.of(1), 3e-3);
+        assert_eq!(machine.reality.friction.joint_friction_n_m.of_joint(1), 3e-3);
         assert!(masses(machine).iter().all(|percent| percent.abs() == 5.0));
         assert!(!machines[..number].contains(machine), "{number}");
     }

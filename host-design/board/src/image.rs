@@ -81,7 +81,7 @@ impl Image {
 
     /// Lookup from addresses to source lines; `None` if the file has no debug information that can be read.
     pub fn lines(&self) -> Option<Lines<'_>> {
-        Lines::of(&self.file).ok().filter(|_| !self.file.is_empty())
+        Lines::parse(&self.file).ok().filter(|_| !self.file.is_empty())
     }
 
     /// File and line of the instruction at an address, if the debug information contains it.

@@ -19,7 +19,7 @@ impl<'a> Lines<'a> {
     ///
     /// # Errors
     /// [`LinesError`] if it is damaged.
-    pub fn of(file: &'a [u8]) -> Result<Self, LinesError> {
+    pub fn parse(file: &'a [u8]) -> Result<Self, LinesError> {
         let elf = object::read::elf::ElfFile32::<object::Endianness>::parse(file).ok();
         let section = |id: SectionId| {
             let found = elf.as_ref().and_then(|elf| elf.section_by_name(id.name()));

@@ -79,7 +79,7 @@ impl Excitation {
     ///
     /// # Errors
     /// [`IdentifyError`] if the rig has no chain with encoders, or its hanging modes cannot be computed.
-    pub fn of(rig: &Rig, duration_s: f64, seed: u64) -> Result<Self, IdentifyError> {
+    pub fn design(rig: &Rig, duration_s: f64, seed: u64) -> Result<Self, IdentifyError> {
         let chain = chain_of(rig)?;
         let [lowest, highest] = hanging_modes(chain)?;
         let count = LINES[usize::from(chain.links.len() > 1)];
@@ -226,7 +226,7 @@ pub(crate) fn shake_machine(
     duration_s: f64,
     seed: u64,
 ) -> Result<Log, IdentifyError> {
-    let mut excitation = Excitation::of(file, duration_s, seed)?;
+    let mut excitation = Excitation::design(file, duration_s, seed)?;
     // Friction that the file does not have reduces the motion.
     for _ in 0..RAISE.2 {
         let trial = Excitation { duration_s: duration_s.min(TRIAL_S), ..excitation.clone() };

@@ -45,7 +45,7 @@ pub struct Feed {
     aim_rad: f64,
     half_rail_m: f64,
     pulse_n: f64,
-    most_n: f64,
+    largest_input: f64,
     /// Change of speed by a pulse according to the file, with cart and links as one rigid body (m/s).
     jolt_m_per_s: f64,
     /// Tick from which the time of the forces is counted; none before the shaking has begun.
@@ -69,7 +69,7 @@ impl Feed {
     /// [`IdentifyError`] if the rig has no chain with encoders.
     pub fn new(rig: &Rig, table: &TableValues, duration_s: f64, seed: u64) -> Result<Self, IdentifyError> {
         let chain = chain_of(rig)?;
-        let excitation = Excitation::of(rig, duration_s, seed)?;
+        let excitation = Excitation::design(rig, duration_s, seed)?;
         let period_s = rig.tick.period_s;
         // The counts of a drive with pulses follow them whatever the cart does.
         let is_moved = table.drive.pulses().is_some();
@@ -86,7 +86,7 @@ impl Feed {
             aim_rad: aim_rad(rig),
             half_rail_m: half_rail(chain),
             pulse_n,
-            most_n: (ROOM * RAISE.2 * peak_n).max(pulse_n).min(limit_n),
+            largest_input: (ROOM * RAISE.2 * peak_n).max(pulse_n).min(limit_n),
             jolt_m_per_s,
             begun: None,
             unsent: 0,
@@ -100,9 +100,9 @@ impl Feed {
     /// The request that makes the firmware begin to shake.
     pub fn begin(&self) -> Request {
         Request::Shake(Shaking {
-            most_n: self.most_n as f32,
-            stiffness_n_per_m: self.excitation.stiffness_n_per_m as f32,
-            damping_n_s_per_m: self.excitation.damping_n_s_per_m as f32,
+            largest_input: self.largest_input as f32,
+            stiffness: self.excitation.stiffness_n_per_m as f32,
+            damping: self.excitation.damping_n_s_per_m as f32,
         })
     }
 
@@ -136,8 +136,8 @@ impl Feed {
         while self.unsent < end.min(last + SENT_AHEAD) {
             let first = self.unsent;
             let forces = core::array::from_fn(|index| {
-                let part =
-                    self.force_n(f64::from(first + index as u32 - begun) * self.period_s) / self.most_n;
+                let part = self.force_n(f64::from(first + index as u32 - begun) * self.period_s)
+                    / self.largest_input;
                 (part.clamp(-1.0, 1.0) * f64::from(FULL)).round() as i8
             });
             requests.push(Request::Forces { first: first as u16, forces });

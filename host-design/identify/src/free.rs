@@ -155,7 +155,7 @@ struct FittedPart {
 }
 
 impl FittedPart {
-    fn of(model: &Model, record: &Record, priors: &[Prior], from: &[f64]) -> Result<Self, IdentifyError> {
+    fn fit(model: &Model, record: &Record, priors: &[Prior], from: &[f64]) -> Result<Self, IdentifyError> {
         let shooting = Shooting { model, record, priors, free: true };
         let fit = shooting.fit_settled(from, WINDOW_S, ITERATIONS.0, ITERATIONS.1);
         let undetermined = IdentifyError::Undetermined("the equations have no solution");
@@ -184,7 +184,7 @@ pub(crate) fn fit(
 ) -> Result<FreeFit, IdentifyError> {
     let shoot = |record: &Record, priors: &[Prior], from: &[f64]| {
         step();
-        FittedPart::of(model, record, priors, from)
+        FittedPart::fit(model, record, priors, from)
     };
     let kinds = model.layout.kinds();
     let start: Vec<f64> = priors.iter().map(|prior| prior.value).collect();

@@ -153,7 +153,7 @@ fn draw_law(rig: &mut Rig, law: TrueFriction, random: &mut dyn FnMut(f64, f64) -
     if let TrueFriction::Dahl | TrueFriction::LuGre = law {
         reality.friction_law = FrictionLaw::Dahl;
         friction.presliding_m *= factors[2];
-        let joints = (0..links).map(|joint| factors[3] * friction.presliding_rad.of(joint));
+        let joints = (0..links).map(|joint| factors[3] * friction.presliding_rad.of_joint(joint));
         friction.presliding_rad = PerJoint::each(joints.collect());
     }
 }
@@ -179,7 +179,8 @@ fn draw_sensors(rig: &mut Rig, priors: &[Prior], random: &mut dyn FnMut(f64, f64
         let drawn: Vec<f64> = (0..links).map(|joint| largest(joint) * random(-1.0, 1.0)).collect();
         PerJoint::each(drawn)
     };
-    let amplitude = |largest: PerJoint| PerJoint::each((0..links).map(|j| largest.of(j).abs()).collect());
+    let amplitude =
+        |largest: PerJoint| PerJoint::each((0..links).map(|j| largest.of_joint(j).abs()).collect());
     let sensors = &mut rig.reality.sensors;
     sensors.eccentricity_rad = amplitude(each(&|joint| priors[layout.sine(joint)].deviation));
     sensors.twice_per_turn_rad = amplitude(each(&|joint| priors[layout.twice_sine(joint)].deviation));
@@ -200,12 +201,12 @@ fn truth(file: &Rig, rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyErr
         ParameterKind::CartViscous => Some(constants.cart_friction),
         ParameterKind::JointViscous(j) => Some(constants.joint_frictions[j]),
         ParameterKind::CartDry => Some(friction.cart_friction_n),
-        ParameterKind::JointDry(j) => Some(friction.joint_friction_n_m.of(j)),
+        ParameterKind::JointDry(j) => Some(friction.joint_friction_n_m.of_joint(j)),
         ParameterKind::Tilt => Some(sensors.rail_tilt_rad),
         ParameterKind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
         ParameterKind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
-        ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of(j)),
-        ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j)),
+        ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of_joint(j)),
+        ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of_joint(j)),
         ParameterKind::Travel => Some(rig.sensors()[0].step::<f64>() / file.sensors()[0].step::<f64>()),
         ParameterKind::EccentricSine(j) => Some(periodic(sensors, j, 0, libm::cos)),
         ParameterKind::EccentricCosine(j) => Some(periodic(sensors, j, 0, libm::sin)),

@@ -16,7 +16,7 @@ pub(crate) fn old_values(rig: &Rig, layout: Layout, start: &[f64], p: &[f64]) ->
     // The start value of a dry friction may be an assumption that is not in the file.
     old[layout.dry(0)] = friction.cart_friction_n;
     for joint in 0..layout.links {
-        old[layout.dry(joint + 1)] = friction.joint_friction_n_m.of(joint);
+        old[layout.dry(joint + 1)] = friction.joint_friction_n_m.of_joint(joint);
     }
     old
 }

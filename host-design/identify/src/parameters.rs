@@ -229,13 +229,13 @@ const SHAPE: f64 = 0.5;
 const ZERO_RAD: f64 = 0.03;
 /// Deviation of the eccentricity of an encoder (rad).
 const ECCENTRICITY_RAD: f64 = 0.002;
-/// That of the magnet of an absolute sensor, which no log is identified without (rad).
+/// The same for the magnet of an absolute sensor, whose eccentricity is always identified (rad).
 const MAGNET_RAD: f64 = 0.01;
 /// That of its error twice per turn: 46 mrad have been measured of a cheap one.
 const MAGNET_TWICE_RAD: f64 = 0.02;
 /// That of an encoder's error twice per turn, if its eccentricity is identified (rad).
 const ENCODER_TWICE_RAD: f64 = 0.0005;
-/// That of a potentiometer, of which all is known is that it is linear to this share of its travel.
+/// The same for a potentiometer, which is linear to this share of its travel.
 const LINEARITY: f64 = 0.005;
 /// Prior deviation of a friction, as a multiple of its expected value.
 pub(crate) const FRICTION: f64 = 10.0;
@@ -276,14 +276,14 @@ pub(crate) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
         ParameterKind::JointViscous(j) => viscous(constants.joint_frictions[j], joint_viscous(j)),
         ParameterKind::CartDry => dry(friction.cart_friction_n, 0.01 * weight),
         ParameterKind::JointDry(j) => {
-            dry(friction.joint_friction_n_m.of(j), 0.001 * gravity * constants.a[j])
+            dry(friction.joint_friction_n_m.of_joint(j), 0.001 * gravity * constants.a[j])
         }
         ParameterKind::AirDrag(j) => Prior {
-            value: rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of(j),
+            value: rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of_joint(j),
             deviation: DRAG * USUAL_DRAG * constants.b[(j, j)],
         },
         ParameterKind::Presliding(j) => {
-            Prior { value: friction.presliding_rad.of(j) / PRESLIDING_PER_DEFLECTION, deviation: 0.0 }
+            Prior { value: friction.presliding_rad.of_joint(j) / PRESLIDING_PER_DEFLECTION, deviation: 0.0 }
         }
         ParameterKind::Tilt => Prior { value: 0.0, deviation: ZERO_RAD },
         ParameterKind::Delay => Prior { value: 0.5, deviation: 0.5 },
@@ -320,7 +320,7 @@ pub(crate) fn periodic(sensors: &SensorErrors, joint: usize, harmonic: usize, pa
         0 => [&sensors.eccentricity_rad, &sensors.eccentricity_phase_rad],
         _ => [&sensors.twice_per_turn_rad, &sensors.twice_per_turn_phase_rad],
     };
-    amplitude_rad.of(joint) * part(phase_rad.of(joint))
+    amplitude_rad.of_joint(joint) * part(phase_rad.of_joint(joint))
 }
 
 /// Prior deviations of the error of a joint's sensor once and twice per turn (rad).

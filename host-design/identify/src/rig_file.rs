@@ -137,7 +137,7 @@ fn sensors(rig: &Rig, found: &Identification) -> Vec<(String, String)> {
         }
         for (part, (key, file)) in keys.into_iter().enumerate() {
             let one = |(joint, found): (usize, &Option<[f64; 2]>)| {
-                number(found.map_or(file.of(joint), |found| found[part]))
+                number(found.map_or(file.of_joint(joint), |found| found[part]))
             };
             let all: Vec<String> = found.iter().enumerate().map(one).collect();
             values.push((format!("reality.{key}"), format!("[{}]", all.join(", "))));

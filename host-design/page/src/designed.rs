@@ -36,7 +36,7 @@ pub(crate) struct DeskDesign {
 
 impl DeskDesign {
     /// Designs what `rig` asks for.
-    pub(crate) fn of(rig: &Rig) -> Result<Self, PageRefusal> {
+    pub(crate) fn design(rig: &Rig) -> Result<Self, PageRefusal> {
         let certified = design(rig)?;
         let table = TableValues::of(rig, &certified, Gains::Sampled);
         Ok(Self { certified, table, trust: ShortTrust::default() })

@@ -52,7 +52,7 @@ impl Fingerprint {
     ///
     /// # Errors
     /// [`FingerprintError`] if the firmware refuses the table, or does not begin to balance.
-    pub fn of(
+    pub fn compute(
         rig: &Rig,
         table: &TableValues,
         rounding: PullRounding,
@@ -152,7 +152,7 @@ mod tests {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
             let rig = Rig::from_path(&file).unwrap();
             let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-            let of = |rounding| Fingerprint::of(&rig, &table, rounding, 10_000).unwrap();
+            let of = |rounding| Fingerprint::compute(&rig, &table, rounding, 10_000).unwrap();
             let (first, again) = (of(PullRounding::AsWritten), of(PullRounding::AsWritten));
             assert_eq!(first, again);
             assert!(first.ticks[0] > 8000 && first.fault.is_some(), "{first:?}");

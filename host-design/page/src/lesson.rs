@@ -118,7 +118,7 @@ fn gains(toml: &str, answer: &[f64], lean_rad: f64) -> Result<(bool, String), Pa
     if answer.len() != rig.states() {
         return Err(PageRefusal::Answer(rig.states()));
     }
-    let mut table = DeskDesign::of(&rig)?.table()?.clone();
+    let mut table = DeskDesign::design(&rig)?.table()?.clone();
     for law in Law::ALL {
         if let Some(gains) = &mut table.laws[law] {
             gains.k.iter_mut().zip(answer).for_each(|(gain, &answer)| *gain = answer as f32);

@@ -12,7 +12,7 @@ use crate::designed::{DeskDesign, ShownRun};
 use crate::fingerprint::{Fingerprint, PullRounding};
 use crate::lesson::Exercise;
 use crate::refusal::{FILE, PageRefusal, failed};
-use crate::sketch;
+use crate::sketch::sketch;
 
 /// A question about a rig: the text of its file, and what is wanted.
 #[derive(Debug, Deserialize)]
@@ -74,7 +74,7 @@ impl Desk {
         let rig = Rig::from_toml(&question.toml, Path::new(FILE))?;
         let motions = question.motions.as_deref();
         match &question.wanted {
-            Asked::Check => Ok(sketch::of(&rig)),
+            Asked::Check => Ok(sketch(&rig)),
             Asked::Set { key, value } => {
                 let mut text = RigText::parse(&question.toml, Path::new(FILE))?;
                 text.set(key, value)?;
@@ -100,7 +100,7 @@ impl Desk {
             }
             &Asked::Fingerprint { rounding, ticks } => {
                 let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
-                Ok(json!(Fingerprint::of(&rig, &table, rounding, ticks)?))
+                Ok(json!(Fingerprint::compute(&rig, &table, rounding, ticks)?))
             }
         }
     }
@@ -110,7 +110,7 @@ impl Desk {
         let kept = self.designed.take().filter(|(text, _)| text == toml);
         let designed = match kept {
             Some((_, designed)) => designed,
-            None => DeskDesign::of(rig)?,
+            None => DeskDesign::design(rig)?,
         };
         Ok(&mut self.designed.insert((toml.to_owned(), designed)).1)
     }

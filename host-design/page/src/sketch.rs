@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use upright_design::rig::{CartInput, LinkEncoder, PlantDescription, Rig};
 
 /// Names, lengths and travel; the weights that can be changed while one looks; values that no bench has.
-pub(crate) fn of(rig: &Rig) -> Value {
+pub(crate) fn sketch(rig: &Rig) -> Value {
     let (lengths_m, travel_m) = match &rig.plant {
         PlantDescription::Chain(chain) => {
             (chain.links.iter().map(|link| link.length_m).collect(), chain.cart.travel_m.map(Some))

@@ -31,7 +31,7 @@ struct RelaxedSearch {
 
 impl RelaxedSearch {
     /// Searches for a motion of `rig` among the first `tried` candidates; the random runs have no supervisor.
-    fn of(rig: &Rig, transition: Transition, tried: u64) -> Result<Self, SwingUpError> {
+    fn run(rig: &Rig, transition: Transition, tried: u64) -> Result<Self, SwingUpError> {
         let setting = Setting::of(rig)?;
         let request = SearchRanges::of(&setting);
         let mut found = candidates(&setting, &request, transition, 0..tried, &|_| ())?;
@@ -141,11 +141,11 @@ fn relaxed(
 ) -> Result<Option<Tried>, SwingUpError> {
     let mut last = None;
     for factor in FACTORS {
-        let mut remedy = Remedy::of(rig);
+        let mut remedy = Remedy::unchanged(rig);
         let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
         let named = changed.map(|limit| limit.name(rig.actuator.input()));
         let Some(name) = named.reduce(|first, _| first) else { return Ok(None) };
-        let outcome = RelaxedSearch::of(&remedy.rig, transition, tried)?;
+        let outcome = RelaxedSearch::run(&remedy.rig, transition, tried)?;
         done();
         let text = format!("{} ({})", remedy.text(), outcome.text());
         if outcome.is_good(&remedy.rig) {
@@ -167,7 +167,7 @@ pub(crate) fn smaller_errors(
 ) -> Result<String, SwingUpError> {
     let mut last = String::new();
     for factor in NARROWER {
-        let mut remedy = Remedy::of(rig);
+        let mut remedy = Remedy::unchanged(rig);
         remedy.narrow(factor);
         let found = runs(&remedy.rig)?;
         last = format!("{} of {} arrive with {}", found.arrived, found.runs, remedy.text());
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn every_advised_number_gives_a_motion() {
         let short = "swing_up.longest_s = 2.2";
-        assert_eq!(RelaxedSearch::of(&single(short), Transition::Up, FEW).unwrap().solved, 0);
+        assert_eq!(RelaxedSearch::run(&single(short), Transition::Up, FEW).unwrap().solved, 0);
         let text = advice_from(&single(short), Transition::Up, FEW, &|| ()).unwrap();
         println!("{text}");
         let (helps, no_help) = text.split_once("; there is none with ").unwrap();
@@ -213,7 +213,7 @@ mod tests {
             for change in advised.split(", or with ") {
                 let (values, found) = change.split_once(" (").unwrap();
                 let rig = single(&format!("{short} and {values}"));
-                let outcome = RelaxedSearch::of(&rig, Transition::Up, FEW).unwrap();
+                let outcome = RelaxedSearch::run(&rig, Transition::Up, FEW).unwrap();
                 assert_eq!(outcome.text(), found.trim_end_matches(')'), "{change}");
                 assert_eq!(outcome.is_good(&rig), is_good, "{change}");
             }
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn a_key_is_raised_as_far_as_the_machine_goes_and_then_the_machine() {
         let relaxed = |limit: RigLimit, values: &str, factor: f64| {
-            let mut remedy = Remedy::of(&single(values));
+            let mut remedy = Remedy::unchanged(&single(values));
             limit.relax(&mut remedy, 5.0, factor).unwrap();
             // As if the values were written into the file.
             assert_eq!(single(&format!("{values} and {}", remedy.text())), remedy.rig);

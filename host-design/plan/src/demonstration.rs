@@ -45,12 +45,13 @@ impl Script {
     ///
     /// # Errors
     /// [`SwingUpError::NoMotions`] if the table has none.
-    pub fn of(rig: &Rig, table: &TableValues, seed: u64, is_wrong: bool) -> Result<Self, SwingUpError> {
+    pub fn draw(rig: &Rig, table: &TableValues, seed: u64, is_wrong: bool) -> Result<Self, SwingUpError> {
         let motions = table.swing_up.as_ref().ok_or(SwingUpError::NoMotions)?;
         let Some(chain) = rig.chain() else { return Err(SwingUpError::NotAChain) };
         let rules = rig.swing_up.clone().unwrap_or_default();
         let share = |percent: f64| if is_wrong { percent / 100.0 } else { 0.0 };
-        let spread = MotionSpread::of(share(rules.mass_spread_percent), share(rules.friction_spread_percent));
+        let spread =
+            MotionSpread::new(share(rules.mass_spread_percent), share(rules.friction_spread_percent));
         let (real, start) = drawn(rig, Transition::Up, &spread, seed);
         let duration_s = |ticks: u32| f64::from(ticks) * rig.tick.period_s;
         let [low, high] = chain.cart.travel_m;
@@ -94,7 +95,7 @@ impl Script {
     pub fn route(rig: &Rig, table: &TableValues, seed: u64) -> Result<Self, SwingUpError> {
         let route = Route::of(rig, table).ok_or(SwingUpError::NoRoute)?;
         let links = rig.links();
-        let (real, start) = drawn(rig, Transition::Up, &MotionSpread::of(0.0, 0.0), seed);
+        let (real, start) = drawn(rig, Transition::Up, &MotionSpread::new(0.0, 0.0), seed);
         let names = route.transitions.iter().map(|transition| transition.name(links));
         let states = route.transitions.iter().flat_map(|transition| states(*transition, links));
         Ok(Self {

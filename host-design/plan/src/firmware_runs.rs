@@ -40,12 +40,12 @@ impl Condition {
     /// The rows of the table in the documentation.
     pub fn all() -> [Self; 8] {
         let degree = core::f64::consts::PI / 180.0;
-        let usual = MotionSpread::of(0.0, 0.0);
+        let usual = MotionSpread::new(0.0, 0.0);
         let named = |name, spread| Self { name, spread, joint_counts: None, is_late: false };
         [
             named("masses and friction as in the file", usual),
-            named("masses ±2 %, friction ±30 %", MotionSpread::of(0.02, 0.3)),
-            named("masses ±5 %, friction ±30 %", MotionSpread::of(0.05, 0.3)),
+            named("masses ±2 %, friction ±30 %", MotionSpread::new(0.02, 0.3)),
+            named("masses ±5 %, friction ±30 %", MotionSpread::new(0.05, 0.3)),
             named("start off by 10°", MotionSpread { tilt_rad: 10.0 * degree, ..usual }),
             named("start off by 20 mm", MotionSpread { position_m: 0.02, ..usual }),
             named("zeros off by 0.3°", MotionSpread { zero_rad: 0.3 * degree, ..usual }),
@@ -93,7 +93,7 @@ impl FirmwareRuns {
     }
 
     /// The raising, counted over all runs, or the lowering of those that were raised.
-    pub fn of(&self, transition: Transition) -> RandomRuns {
+    pub fn runs_of(&self, transition: Transition) -> RandomRuns {
         if transition == Transition::Up { self.raise_in_all() } else { self.lower.clone() }
     }
 

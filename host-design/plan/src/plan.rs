@@ -226,13 +226,13 @@ fn judged(
     progress(ProgressStep::Done);
     let is_searched = raise.search.is_some();
     for transition in Transition::BOTH {
-        let found = runs.of(transition);
+        let found = runs.runs_of(transition);
         if is_enough(rig, &found) {
             continue;
         }
         let help = smaller_errors(rig, |rig| {
             let motions = refined(rig, &stored)?;
-            Ok(arriving(rig, &designed_table(rig, &motions)?, &motions)?.of(transition))
+            Ok(arriving(rig, &designed_table(rig, &motions)?, &motions)?.runs_of(transition))
         })?;
         let mut help = format!("{}; {help}", runs.ended_text());
         if is_searched {
@@ -248,7 +248,7 @@ fn judged(
         });
     }
     let [up, down] = peaks;
-    let [raised, lowered] = Transition::BOTH.map(|transition| runs.of(transition));
+    let [raised, lowered] = Transition::BOTH.map(|transition| runs.runs_of(transition));
     let judgement =
         |transition, (search, score), peaks, runs| MotionJudgement { transition, search, score, peaks, runs };
     Ok(SwingUpPlan {

@@ -50,7 +50,7 @@ pub(crate) struct Remedy {
 
 impl Remedy {
     /// A remedy that does not change `rig` yet.
-    pub(crate) fn of(rig: &Rig) -> Self {
+    pub(crate) fn unchanged(rig: &Rig) -> Self {
         Self { rig: rig.clone(), keys: Vec::new() }
     }
 

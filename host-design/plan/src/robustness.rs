@@ -32,15 +32,15 @@ pub struct MotionSpread {
 
 impl MotionSpread {
     /// The given ranges of masses and friction, a start off by up to 1° and 1 mm, encoder zeros off by up to 0.1°.
-    pub fn of(mass: f64, friction: f64) -> Self {
+    pub fn new(mass: f64, friction: f64) -> Self {
         let degree = core::f64::consts::PI / 180.0;
         Self { mass, friction, tilt_rad: degree, position_m: 1e-3, zero_rad: 0.1 * degree }
     }
 
-    /// Masses and friction wrong by up to the spreads of `[swing_up]`, the rest as in [`of`](Self::of).
+    /// Masses and friction wrong by up to the spreads of `[swing_up]`, the rest as in [`new`](Self::new).
     pub(crate) fn asked(rig: &Rig) -> Self {
         let rules = rig.swing_up.clone().unwrap_or_default();
-        Self::of(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0)
+        Self::new(rules.mass_spread_percent / 100.0, rules.friction_spread_percent / 100.0)
     }
 }
 
@@ -132,7 +132,7 @@ pub(crate) fn drawn(rig: &Rig, transition: Transition, spread: &MotionSpread, se
         let tilt = between(tilt_rad);
         start[2 + 2 * joint] += tilt - below;
         below = tilt;
-        wrong.push(zeros.of(joint) + between(spread.zero_rad));
+        wrong.push(zeros.of_joint(joint) + between(spread.zero_rad));
     }
     *zeros = PerJoint::each(wrong);
     (rig, start)
@@ -150,7 +150,7 @@ pub(crate) fn sample(
     let mut trial =
         TrackingTrial { counts: true, seed: Some(seed), start, ..TrackingTrial::ideal(setting, motion) };
     for (joint, error) in trial.zero_error.iter_mut().skip(1).enumerate() {
-        *error = rig.reality.sensors.homing_error_rad.of(joint);
+        *error = rig.reality.sensors.homing_error_rad.of_joint(joint);
     }
     if let PlantDescription::Chain(chain) = rig.plant {
         trial.chain = chain;

@@ -72,7 +72,7 @@ impl Chip {
         let mut node = Command::new("node");
         node.current_dir(harness()).arg("replay.mjs").arg(uf2).arg(encoders.to_string());
         let mut process = Running(node.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap());
-        let answers = Lines::of(process.stdout.take().unwrap());
+        let answers = Lines::from_pipe(process.stdout.take().unwrap());
         Self { process, answers }
     }
 

@@ -116,7 +116,7 @@ pub struct Lines(Receiver<String>);
 
 impl Lines {
     /// The lines of this pipe.
-    pub fn of(pipe: impl Read + Send + 'static) -> Self {
+    pub fn from_pipe(pipe: impl Read + Send + 'static) -> Self {
         let (sender, receiver) = channel();
         std::thread::spawn(move || {
             for line in BufReader::new(pipe).lines().map_while(Result::ok) {

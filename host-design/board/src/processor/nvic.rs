@@ -106,7 +106,7 @@ impl Nvic {
     }
 
     /// Full priority, subpriority included; a lower value is more urgent.
-    fn of(&self, exception: usize) -> i32 {
+    fn priority_of(&self, exception: usize) -> i32 {
         match exception {
             NMI => -2,
             HARD_FAULT => -1,
@@ -123,7 +123,7 @@ impl Nvic {
     pub(crate) fn executing(&self, primask: bool, faultmask: bool, basepri: u8) -> i32 {
         let mut lowest = 256;
         for exception in self.active.members() {
-            lowest = lowest.min(self.grouped(self.of(exception)));
+            lowest = lowest.min(self.grouped(self.priority_of(exception)));
         }
         if basepri != 0 {
             lowest = lowest.min(self.grouped(basepri.into()));
@@ -143,13 +143,13 @@ impl Nvic {
             return None;
         }
         let ready = Set(self.pending.0 & self.enabled.0);
-        let first = ready.members().min_by_key(|&exception| (self.of(exception), exception))?;
-        Some((first, self.grouped(self.of(first))))
+        let first = ready.members().min_by_key(|&exception| (self.priority_of(exception), exception))?;
+        Some((first, self.grouped(self.priority_of(first))))
     }
 
     /// Group priority of an exception.
     pub(crate) fn preemption(&self, exception: usize) -> i32 {
-        self.grouped(self.of(exception))
+        self.grouped(self.priority_of(exception))
     }
 
     pub(crate) fn activate(&mut self, exception: usize) {

@@ -45,7 +45,7 @@ impl Spectrum {
             for ((input, value), weight) in input.iter_mut().zip(segment).zip(&window) {
                 *input = weight * (value - mean);
             }
-            for (sum, bin) in density.iter_mut().zip(transform.of(&input)) {
+            for (sum, bin) in density.iter_mut().zip(transform.spectrum(&input)) {
                 *sum += bin.norm_sqr();
             }
             segments += 1.0;
@@ -119,7 +119,7 @@ impl RealTransform {
     }
 
     /// The transform at the frequencies from 0 to half the sampling rate.
-    fn of(&self, samples: &[f64]) -> Vec<Complex<f64>> {
+    fn spectrum(&self, samples: &[f64]) -> Vec<Complex<f64>> {
         let mut bins: Vec<_> = samples.as_chunks().0.iter().map(|&[re, im]| Complex::new(re, im)).collect();
         self.half.process(&mut bins);
         let first = bins[0];
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn the_transform_is_the_sum_that_defines_it() {
         let samples: Vec<f64> = (0..SEGMENT).map(|i| ((i * i) as f64 * 0.37).sin() + 0.1).collect();
-        let found = RealTransform::new().of(&samples);
+        let found = RealTransform::new().spectrum(&samples);
         assert_eq!(found.len(), SEGMENT / 2 + 1);
         for k in [0, 1, 1234, SEGMENT / 4, SEGMENT / 4 + 1, SEGMENT / 2 - 1, SEGMENT / 2] {
             let turn = |i: usize| -2.0 * core::f64::consts::PI * ((i * k) % SEGMENT) as f64 / SEGMENT as f64;

@@ -80,7 +80,7 @@ fn integrate_problem(
         return Err(ReferenceError::BadRequest);
     }
     assert_eq!(start.len(), problem.plant.states(), "length of the state");
-    match Small::of(start) {
+    match Small::from_state(start) {
         Some(start) => integrate_with(SMALL.clone(), problem, &start, duration, tolerance),
         None => integrate_with(Method::dop853(), problem, &start.to_vec(), duration, tolerance),
     }
@@ -161,7 +161,7 @@ struct Small {
 }
 
 impl Small {
-    fn of(state: &[f64]) -> Option<Self> {
+    fn from_state(state: &[f64]) -> Option<Self> {
         let mut values = [0.0; 10];
         values.get_mut(..state.len())?.copy_from_slice(state);
         Some(Self { length: state.len(), values })

@@ -52,13 +52,14 @@ impl RealEncoders {
 
 impl Joint {
     fn of(errors: &SensorErrors, joint: usize, stated_delay_s: f64) -> Self {
-        let once = [errors.eccentricity_rad.of(joint), errors.eccentricity_phase_rad.of(joint)];
-        let twice = [errors.twice_per_turn_rad.of(joint), errors.twice_per_turn_phase_rad.of(joint)];
+        let once = [errors.eccentricity_rad.of_joint(joint), errors.eccentricity_phase_rad.of_joint(joint)];
+        let twice =
+            [errors.twice_per_turn_rad.of_joint(joint), errors.twice_per_turn_phase_rad.of_joint(joint)];
         let mut of = Self {
-            zero_error: errors.homing_error_rad.of(joint),
+            zero_error: errors.homing_error_rad.of_joint(joint),
             harmonics: [once, twice],
             at_homing: 0.0,
-            delay_s: stated_delay_s + errors.sensor_delay_s.of(joint),
+            delay_s: stated_delay_s + errors.sensor_delay_s.of_joint(joint),
         };
         of.at_homing = of.periodic(if joint == 0 { PI } else { 0.0 });
         of
@@ -81,7 +82,7 @@ pub fn hanging_by_hand(rig: &Rig) -> Vec<f64> {
     let mut hanging = vec![0.0; rig.states()];
     hanging[2] = PI;
     for (joint, angle) in hanging[2..].iter_mut().step_by(2).enumerate() {
-        *angle -= rig.reality.sensors.homing_error_rad.of(joint);
+        *angle -= rig.reality.sensors.homing_error_rad.of_joint(joint);
     }
     hanging
 }

@@ -109,7 +109,7 @@ impl<const N: usize> RealChain<N> {
             joints,
             cart,
             bent: ([0.0; N], 0.0),
-            drag: air_drag.is_any().then(|| core::array::from_fn(|j| air_drag.of(j))),
+            drag: air_drag.is_any().then(|| core::array::from_fn(|j| air_drag.of_joint(j))),
             belt,
             slope,
             longest_step_s: LARGEST_PHASE / stiffness_per_mass.sqrt(),
@@ -124,12 +124,6 @@ impl<const N: usize> RealChain<N> {
     /// eigenvalue).
     pub fn longest_step_s(&self) -> f64 {
         self.longest_step_s
-    }
-
-    /// The same machine with another longest step (s), to study its effect.
-    pub fn with_longest_step_s(mut self, longest_step_s: f64) -> Self {
-        self.longest_step_s = longest_step_s;
-        self
     }
 
     /// Rate of change in `at`, reached from `from`, where the bristles were bent as they are stored now.
@@ -293,8 +287,8 @@ fn bristles<const N: usize>(rig: &Rig, mobility: &[f64]) -> (Option<[Bristle; N]
         })
     };
     let joint = |j: usize| {
-        let coulomb = friction.joint_friction_n_m.of(j);
-        contact(coulomb, friction.stribeck_rad_per_s, friction.presliding_rad.of(j), mobility[j + 1])
+        let coulomb = friction.joint_friction_n_m.of_joint(j);
+        contact(coulomb, friction.stribeck_rad_per_s, friction.presliding_rad.of_joint(j), mobility[j + 1])
     };
     let joints = friction.joint_friction_n_m.is_any().then(|| core::array::from_fn(joint));
     let cart = (friction.cart_friction_n > 0.0).then(|| {

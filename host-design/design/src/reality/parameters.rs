@@ -20,9 +20,9 @@ pub fn real_chain(chain: &Chain, errors: &ParameterErrors) -> Chain {
     let mut real = chain.clone();
     real.cart.mass_kg = real.cart.mass_kg.map(|mass| mass * factor(errors.cart_mass_percent));
     for (index, link) in real.links.iter_mut().enumerate() {
-        let mass = factor(errors.link_mass_percent.of(index));
-        let length = factor(errors.link_length_percent.of(index));
-        let inertia = factor(errors.link_inertia_percent.of(index)) * mass * length * length;
+        let mass = factor(errors.link_mass_percent.of_joint(index));
+        let length = factor(errors.link_length_percent.of_joint(index));
+        let inertia = factor(errors.link_inertia_percent.of_joint(index)) * mass * length * length;
         let uniform = link.mass_kg * link.length_m * link.length_m / 12.0;
         link.inertia_kg_m2 = Some(inertia * link.inertia_kg_m2.unwrap_or(uniform));
         link.mass_kg *= mass;

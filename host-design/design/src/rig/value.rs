@@ -80,7 +80,7 @@ impl PerJoint {
     }
 
     /// The number of joint `joint`, counted from 0.
-    pub fn of(&self, joint: usize) -> f64 {
+    pub fn of_joint(&self, joint: usize) -> f64 {
         self.0.get(joint).or(self.0.first()).copied().unwrap_or_default()
     }
 

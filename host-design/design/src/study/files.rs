@@ -40,15 +40,15 @@ struct File {
 pub(super) fn merged(files: &[PathBuf], about: &Value) -> Result<Outcomes, StudyError> {
     let files: Vec<File> = files.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let Some(first) = files.first() else { return Err(StudyError::Missing { shard: 1, of: 1 }) };
-    let of = first.header.shard.of();
+    let of = first.header.shard.shards();
     for File { path, header, .. } in &files {
         let other =
             |theirs: String, ours: String| Err(StudyError::OtherStudy { file: path.clone(), theirs, ours });
         if header.study != *about {
             return other(header.study.to_string(), about.to_string());
         }
-        if header.shard.of() != of {
-            return other(format!("{} shards", header.shard.of()), format!("{of} shards"));
+        if header.shard.shards() != of {
+            return other(format!("{} shards", header.shard.shards()), format!("{of} shards"));
         }
         if header.parts != first.header.parts {
             return other(format!("{:?}", header.parts), format!("{:?}", first.header.parts));
@@ -84,7 +84,7 @@ fn place(file: File, all: &mut Outcomes) -> Result<(), StudyError> {
     };
     for Line { part, run, outcome } in lines {
         let has_run =
-            run % shard.of() + 1 == shard.number() && parts.get(&part).is_some_and(|&runs| run < runs);
+            run % shard.shards() + 1 == shard.number() && parts.get(&part).is_some_and(|&runs| run < runs);
         match all.get_mut(&part).filter(|_| has_run) {
             None => return wrong(&part, run, "does not belong to it"),
             Some(outcomes) => {

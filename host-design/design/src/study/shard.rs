@@ -18,7 +18,7 @@ impl Shard {
     }
 
     /// Number of shards in the study.
-    pub fn of(self) -> u64 {
+    pub fn shards(self) -> u64 {
         self.of
     }
 

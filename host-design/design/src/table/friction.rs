@@ -41,7 +41,7 @@ pub(super) fn friction_map(
     };
     let coulomb = |axis: usize| match axis {
         0 => OF_CART * known.cart_n,
-        joint => known.joint_n_m.of(joint - 1),
+        joint => known.joint_n_m.of_joint(joint - 1),
     };
     let width = |axis: usize| if axis == 0 { known.cart_speed_m_per_s } else { known.joint_rate_rad_per_s };
     let mut map = FrictionMap {

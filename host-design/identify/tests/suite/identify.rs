@@ -82,7 +82,7 @@ fn the_parameters_of_a_double_pendulum_are_found_with_their_deviations() {
     for j in 0..2 {
         within(ParameterKind::FirstMoment(j), constants.a[j], 0.01 * constants.a[j]);
         within(ParameterKind::SecondMoment(j), constants.b[(j, j)], 0.01 * constants.b[(j, j)]);
-        within(ParameterKind::Zero(j), truth.reality.sensors.homing_error_rad.of(j), 0.0009);
+        within(ParameterKind::Zero(j), truth.reality.sensors.homing_error_rad.of_joint(j), 0.0009);
         within(ParameterKind::JointViscous(j), 0.0024, 0.00024);
     }
     within(ParameterKind::TotalMass, constants.total_mass, 0.02 * constants.total_mass);
@@ -110,7 +110,7 @@ fn readings_that_are_old_are_known_if_the_file_states_their_age() {
     let mut log = shake(&truth, 15.0, 3).unwrap();
     let constants =
         ChainParameters::<f64>::of(&real_chain(truth.chain().unwrap(), &truth.reality.parameters));
-    let dry = |j: usize| truth.reality.friction.joint_friction_n_m.of(j);
+    let dry = |j: usize| truth.reality.friction.joint_friction_n_m.of_joint(j);
     // Errors in deviations.
     let errors = |found: &Identification| {
         let error = |(kind, wanted): (ParameterKind, f64)| {
@@ -237,14 +237,14 @@ fn a_log_that_no_machine_explains_does_not_fit() {
 fn the_excitation_keeps_the_model_within_its_rail() {
     for name in ["single-quanser-ip02", "triple-glueck-eder-kugi", "quadruple-paper"] {
         let rig = Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap();
-        let excitation = Excitation::of(&rig, 20.0, 1).unwrap();
+        let excitation = Excitation::design(&rig, 20.0, 1).unwrap();
         let most = rig.force_limit_n().unwrap();
         assert!(excitation.amplitude_n > 1e-4 * most, "{name}: {excitation:?}");
         assert_eq!(excitation.force_n(0.0, 0.0, 0.0), 0.0);
     }
     let model = "name = \"m\"\n[model]\na = [[0, 1], [1, 0]]\nb = [0, 1]\n";
     if let Ok(rig) = Rig::from_toml(model, Path::new("m.toml")) {
-        assert!(matches!(Excitation::of(&rig, 20.0, 1), Err(IdentifyError::NoEncoders(_))));
+        assert!(matches!(Excitation::design(&rig, 20.0, 1), Err(IdentifyError::NoEncoders(_))));
     }
 }
 

@@ -32,7 +32,10 @@ fn a_machine_is_the_same_every_time_and_within_what_is_stated() {
         let machine = draw(10.0, number);
         let parameters = &machine.rig.reality.parameters;
         let of_links = [&parameters.link_mass_percent, &parameters.link_length_percent];
-        assert!(of_links.iter().all(|each| (0..3).all(|link| each.of(link).abs() <= 10.0)), "{parameters:?}");
+        assert!(
+            of_links.iter().all(|each| (0..3).all(|link| each.of_joint(link).abs() <= 10.0)),
+            "{parameters:?}"
+        );
         let delay = machine.truth(ParameterKind::Delay).unwrap();
         assert!((0.0..1.0).contains(&delay), "{delay}");
         // The file has 10 N s/m and 1 % of the weight is 0.62 N.

@@ -76,7 +76,7 @@ fn shape_friction_and_zeros_are_found_as_ratios_and_nothing_of_the_cart() {
         let second = scale * constants.b[(j, j)];
         within(ParameterKind::SecondMoment(j), second, 1e-3 * second);
         within(ParameterKind::JointViscous(j), scale * 0.0024, 0.05 * scale * 0.0024);
-        within(ParameterKind::Zero(j), truth.reality.sensors.homing_error_rad.of(j), 1e-4);
+        within(ParameterKind::Zero(j), truth.reality.sensors.homing_error_rad.of_joint(j), 1e-4);
     }
     within(ParameterKind::Tilt, 0.003, 0.003);
     // What is not seen stays as in the file.

@@ -43,9 +43,9 @@ pub(super) struct ConnectedBoard {
 
 impl ConnectedBoard {
     /// A conversation with the board of this rig, and the greeting for the page.
-    pub(super) fn of(toml: &str, motions: Option<&str>) -> Result<(Self, Value), PageRefusal> {
+    pub(super) fn connect(toml: &str, motions: Option<&str>) -> Result<(Self, Value), PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
-        let table = DeskDesign::of(&rig)?.table_with(&rig, motions)?;
+        let table = DeskDesign::design(&rig)?.table_with(&rig, motions)?;
         let board = Self { console: Console::new(Monitor::new(LINE)), expected: (&rig).into() };
         Ok((board, json!({ "hello": greeting(&rig, &table, LINE, None), "you": VIEWER })))
     }

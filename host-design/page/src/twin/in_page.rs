@@ -85,7 +85,7 @@ impl InPage {
                 Ok(twin.run(asked, [passed_s, f64::from(most_ticks)], is_silent))
             }
             TwinQuestion::Connect { toml, motions } => {
-                let (board, told) = ConnectedBoard::of(&toml, motions.as_deref())?;
+                let (board, told) = ConnectedBoard::connect(&toml, motions.as_deref())?;
                 self.board = Some(board);
                 Ok(told)
             }
@@ -105,7 +105,7 @@ impl Twin {
         since_1970_s: f64,
     ) -> Result<Self, PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
-        let table = DeskDesign::of(&rig)?.table_with(&rig, motions)?;
+        let table = DeskDesign::design(&rig)?.table_with(&rig, motions)?;
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, law) };
         let machine = SimulatedMachine {

@@ -18,7 +18,7 @@ fn rig_and_stored(name: &str) -> (Rig, Stored) {
 
 /// Whether the firmware with this table gets through a demonstration.
 fn arrives(rig: &Rig, table: &TableValues, seed: u64, is_wrong: bool) -> bool {
-    Script::of(rig, table, seed, is_wrong).unwrap().run(table).unwrap().arrived
+    Script::draw(rig, table, seed, is_wrong).unwrap().run(table).unwrap().arrived
 }
 
 /// The same with these motions, which are not the stored ones.

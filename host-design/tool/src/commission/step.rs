@@ -62,11 +62,8 @@ impl CommissionStep {
         (Self::Balance, "balance", "raised by hand, the machine balances for 10 s"),
     ];
 
-    /// The steps that find every error in the wiring, before anything is measured.
-    pub const EARLY: [CommissionStep; 6] =
-        [Self::Connect, Self::Contacts, Self::Homing, Self::Signs, Self::Turns, Self::Motor];
-
-    /// The steps with the firmware of the rig file.
+    /// The steps with the firmware of the rig file: up to that of the motor, they find every error in the wiring; then
+    /// the machine is measured.
     pub const FIRST: [CommissionStep; 10] = [
         Self::Connect,
         Self::Contacts,

@@ -136,7 +136,9 @@ fn hanging(
             None::<()>
         })?;
         let all: Vec<Hanging> = (0..sensors.len())
-            .map(|index| Hanging::of(shown.iter().map(|(_, counts)| counts[index]), sensors[index].turn))
+            .map(|index| {
+                Hanging::from_counts(shown.iter().map(|(_, counts)| counts[index]), sensors[index].turn)
+            })
             .collect();
         let moving = sensors.iter().zip(&all).find(|(sensor, hanging)| {
             let noise = plan.table.absolute.still_counts[sensor.link];
@@ -154,7 +156,7 @@ fn hanging(
 }
 
 impl Hanging {
-    fn of(counts: impl Iterator<Item = f64> + Clone, turn: f64) -> Self {
+    fn from_counts(counts: impl Iterator<Item = f64> + Clone, turn: f64) -> Self {
         let first = counts.clone().next().unwrap_or_default();
         let away: Vec<f64> = counts.map(|count| near(count - first, turn)).collect();
         let share = 1.0 / away.len().max(1) as f64;

@@ -126,7 +126,7 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
 
 /// Bytes of machine code by the crate of their source line.
 fn code_by_crate(image: &LinkedImage) -> Result<BTreeMap<String, u32>, SizeError> {
-    let lines = Lines::of(&image.bytes)?;
+    let lines = Lines::parse(&image.bytes)?;
     let mut crates = BTreeMap::new();
     for function in &image.functions {
         let mut located = 0;

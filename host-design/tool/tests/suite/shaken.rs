@@ -75,7 +75,7 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
     for joint in 0..2 {
         close(ParameterKind::FirstMoment(joint), constants.a[joint]);
         close(ParameterKind::SecondMoment(joint), constants.b[(joint, joint)]);
-        close(ParameterKind::Zero(joint), machine.reality.sensors.homing_error_rad.of(joint));
+        close(ParameterKind::Zero(joint), machine.reality.sensors.homing_error_rad.of_joint(joint));
     }
 }
 

@@ -40,7 +40,7 @@ impl Twin {
             .spawn()
             .unwrap();
         let mut process = Running(process);
-        let address = Lines::of(process.stdout.take().unwrap()).next("the address of the twin");
+        let address = Lines::from_pipe(process.stdout.take().unwrap()).next("the address of the twin");
         Self { process, address }
     }
 }

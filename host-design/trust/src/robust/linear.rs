@@ -26,7 +26,7 @@ pub(super) struct LinearPlants<'a> {
 
 impl<'a> LinearPlants<'a> {
     /// The plants of `rig`, whose own design is `design`.
-    pub(super) fn of(
+    pub(super) fn new(
         rig: &'a Rig,
         design: &Design<f64>,
         tolerances: &'a Tolerances,

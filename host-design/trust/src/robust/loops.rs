@@ -68,14 +68,14 @@ pub(super) struct CandidateLoops<'a> {
 
 impl<'a> CandidateLoops<'a> {
     /// Designs every candidate, without certification, and sorts the loops.
-    pub(super) fn of(
+    pub(super) fn design(
         rig: &'a Rig,
         tolerances: &'a Tolerances,
         settings: &'a JudgeSettings,
         own: &Certified,
         progress: Progress<'_>,
     ) -> Result<Self, RobustError> {
-        let plants = LinearPlants::of(rig, &own.double, tolerances, settings.disturbance)?;
+        let plants = LinearPlants::new(rig, &own.double, tolerances, settings.disturbance)?;
         let of_law = |law| Ok((law, candidates(rig, law)?));
         let of_laws: Vec<(Law, Vec<Candidate>)> =
             Law::ALL.map(of_law).into_iter().collect::<Result<_, RobustError>>()?;

@@ -72,7 +72,7 @@ pub fn choose(
     // Fault detection expects what is judged.
     let rig = &Rig { robust: Some(tolerances.clone()), ..rig.clone() };
     let own = design(rig)?;
-    let loops = CandidateLoops::of(rig, tolerances, settings, &own, progress)?;
+    let loops = CandidateLoops::design(rig, tolerances, settings, &own, progress)?;
     let choice = Search { loops: &loops, tolerances, settings }.choice(progress)?;
     let front = with_front.then(|| front(&loops, &SCALES, progress)).transpose()?;
     Ok((choice, front))

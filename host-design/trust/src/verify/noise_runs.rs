@@ -74,7 +74,7 @@ impl LimitShare {
         most(most(self.rail, self.angle), self.speed)
     }
 
-    fn of(limits: &Limits<MAX_SENSORS>, state: &[f64]) -> Self {
+    fn at(limits: &Limits<MAX_SENSORS>, state: &[f64]) -> Self {
         let &[position, speed, ..] = state else { return Self::default() };
         // In the table, a limit that is not there is the largest number.
         let share = |of: f64, limit: f32| (limit.abs() < f32::MAX).then(|| of / f64::from(limit));
@@ -176,7 +176,7 @@ fn noise_of(runs: &[(Rig, Scenario)], table: &TableValues, duration_s: f64) -> R
             }
             sums.ticks += 1.0;
             if is_chain {
-                sums.share = sums.share.max(LimitShare::of(&table.limits, sample.state));
+                sums.share = sums.share.max(LimitShare::at(&table.limits, sample.state));
             }
             sums.force += sample.force * sample.force;
             for (sum, x) in sums.state.iter_mut().zip(sample.state) {

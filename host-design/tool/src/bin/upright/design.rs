@@ -68,7 +68,7 @@ impl DesignCommand {
         };
         let name = || self.rig.display().to_string();
         let (certified, poles, reports, table) = with_spinner("designing", || -> Result<_, Failure> {
-            let failed = |source| Failure::of(name(), source);
+            let failed = |source| Failure::of_rig(name(), source);
             let certified = design(&rig).map_err(failed)?;
             let poles = certified.poles(&rig).map_err(failed)?;
             let assessments = certified.assess(&rig).map_err(failed)?;
@@ -85,16 +85,16 @@ impl DesignCommand {
         warn_of_unusual_values(&rig, &self.rig);
         refuse_failing_table(&rig, &reports)?;
         let Some(path) = path else { return Ok(()) };
-        let mut table = table.map_err(|source| Failure::of(name(), source))?;
+        let mut table = table.map_err(|source| Failure::of_rig(name(), source))?;
         if reports.iter().any(|report| report.run.is_none()) {
-            return Err(Failure::of(name(), SimulationError::NoObserver));
+            return Err(Failure::of_rig(name(), SimulationError::NoObserver));
         }
         if self.swing_up || self.transitions {
-            table = with_stored_motions(&self.rig, &rig, table, Wanted::of(self.transitions))?;
+            table = with_stored_motions(&self.rig, &rig, table, Wanted::from_option(self.transitions))?;
         }
         if (self.swing_up || self.transitions) && table.swing_up.is_none() {
             let source = Stored::beside(&self.rig).err().unwrap_or(SwingUpError::Outdated);
-            return Err(Failure::of(name(), source));
+            return Err(Failure::of_rig(name(), source));
         }
         warn_of_tick(&rig);
         let source = gains_source(&rig, &table);

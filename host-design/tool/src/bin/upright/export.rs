@@ -32,7 +32,7 @@ impl ExportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         let (_, table) = with_table(&rig, &self.rig, Gains::Sampled)?;
-        let header = c_header(&rig, &table).map_err(|error| Failure::of(self.rig.display(), error))?;
+        let header = c_header(&rig, &table).map_err(|error| Failure::of_rig(self.rig.display(), error))?;
         Ok(write_atomically(&self.c, header.as_bytes())?)
     }
 }

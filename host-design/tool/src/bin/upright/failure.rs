@@ -42,7 +42,7 @@ impl Display for Failure {
 
 impl Failure {
     /// An error of the rig with this name, or in this file.
-    pub(crate) fn of(rig: impl Display, error: impl Error + 'static) -> Self {
+    pub(crate) fn of_rig(rig: impl Display, error: impl Error + 'static) -> Self {
         Self { words: format!("{rig}: {error}"), exit_status: exit_status(&error) }
     }
 

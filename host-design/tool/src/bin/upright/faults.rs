@@ -104,7 +104,7 @@ impl FaultsCommand {
             table
         };
         if self.swing_up && table.swing_up.is_none() {
-            return Err(Failure::of(rig.name, SwingUpError::NoMotions));
+            return Err(Failure::of_rig(rig.name, SwingUpError::NoMotions));
         }
         let built = self.target.built(&rig, &table)?;
         let place = built.place(self.seed);

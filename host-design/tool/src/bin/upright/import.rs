@@ -32,7 +32,7 @@ impl ImportCommand {
         let text = std::fs::read_to_string(&self.urdf)
             .map_err(|error| Failure::argument(format!("{name}: cannot be read: {error}")))?;
         let file = self.urdf.file_name().unwrap_or_default().to_string_lossy();
-        let rig = rig_file(&text, &file).map_err(|error| Failure::of(&name, error))?;
+        let rig = rig_file(&text, &file).map_err(|error| Failure::of_rig(&name, error))?;
         match self.out {
             None => Ok(std::io::stdout().write_all(rig.as_bytes())?),
             Some(path) => {

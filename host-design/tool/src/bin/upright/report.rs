@@ -187,13 +187,13 @@ fn with_swing_up(file: &Path, rig: &Rig, table: &TableValues) -> Option<TableVal
 
 /// A simulated run of the motions of `table`; `None` if it has none or the run fails.
 fn demonstration(rig: &Rig, table: &TableValues, seed: u64) -> Option<Demonstration> {
-    Script::of(rig, table, seed, false).ok()?.run(table).ok()
+    Script::draw(rig, table, seed, false).ok()?.run(table).ok()
 }
 
 /// A simulated run through all motions that are stored beside the rig file.
 fn route(file: &Path, rig: &Rig, table: &TableValues, seed: u64) -> Result<Demonstration, Failure> {
     let table = with_stored_motions(file, rig, table.clone(), Wanted::Transitions)?;
-    let script = Script::route(rig, &table, seed).map_err(|source| Failure::of(&rig.name, source))?;
+    let script = Script::route(rig, &table, seed).map_err(|source| Failure::of_rig(&rig.name, source))?;
     Ok(with_spinner("the route", || script.run(&table)).map_err(RunError::from)?)
 }
 

@@ -96,7 +96,7 @@ impl RobustCommand {
         if self.split.is_used() {
             return Err(Failure::argument("--shard and --merge are for --as-it-is".to_owned()));
         }
-        let failed = |source: RobustError| Failure::of(&rig.name, source);
+        let failed = |source: RobustError| Failure::of_rig(&rig.name, source);
         let (choice, front) =
             with_progress(|progress| choose(&rig, &tolerances, &settings, self.front, progress))
                 .map_err(failed)?;

@@ -146,7 +146,8 @@ impl SimulateCommand {
     /// The rig, and its table with the stored motions.
     pub(crate) fn with_motions(&self) -> Result<(Rig, TableValues), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
+        let table =
+            with_stored_motions(&self.variation.rig, &rig, table, Wanted::from_option(self.transitions))?;
         Ok((rig, table))
     }
 
@@ -158,9 +159,9 @@ impl SimulateCommand {
         let (rig, table) = self.with_motions()?;
         let script = match self.transitions {
             true => Script::route(&rig, &table, self.seed),
-            false => Script::of(&rig, &table, self.seed, self.wrong),
+            false => Script::draw(&rig, &table, self.seed, self.wrong),
         };
-        let script = script.map_err(|source| Failure::of(&rig.name, source))?;
+        let script = script.map_err(|source| Failure::of_rig(&rig.name, source))?;
         let run = run(&rig, &table, &script)?;
         let parts: Vec<_> =
             run.parts.iter().map(|(at_s, name)| json!({ "at_s": at_s, "part": name })).collect();

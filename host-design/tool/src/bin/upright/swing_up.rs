@@ -108,7 +108,7 @@ impl SwingUpCommand {
 
     /// Prints and draws the margins of both stored motions.
     fn margins(&self, rig: &Rig) -> Result<(), Failure> {
-        let failed = |source: SwingUpError| Failure::of(&rig.name, source);
+        let failed = |source: SwingUpError| Failure::of_rig(&rig.name, source);
         let stored = Stored::beside(&self.rig).map_err(failed)?;
         let table =
             motions(rig, &stored).and_then(|motions| designed_table(rig, &motions)).map_err(failed)?;
@@ -124,7 +124,7 @@ impl SwingUpCommand {
 
     /// Prints and draws duration, force and robustness of the candidates of a search.
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
-        let failed = |source: SwingUpError| Failure::of(&rig.name, source);
+        let failed = |source: SwingUpError| Failure::of_rig(&rig.name, source);
         let solved = with_progress(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
         let (title, input) = (format!("{}: candidates of a raising", rig.name), rig.actuator.input());
         self.draw(&trade_figure(&title, &solved, input))?;
@@ -146,7 +146,7 @@ impl SwingUpCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         warn_of_an_arm(&rig);
-        let failed = |source: SwingUpError| Failure::of(&rig.name, source);
+        let failed = |source: SwingUpError| Failure::of_rig(&rig.name, source);
         if self.table {
             // The outcome depends on the motions as well as on the rig file.
             let stored = Stored::beside(&self.rig).map_err(failed)?.to_json();
@@ -172,7 +172,7 @@ impl SwingUpCommand {
         } else {
             with_progress(|progress| search(&rig, progress)).map_err(failed)?
         };
-        let script = Script::of(&rig, &plan.table, self.seed, false).map_err(failed)?;
+        let script = Script::draw(&rig, &plan.table, self.seed, false).map_err(failed)?;
         let demonstration = script.run(&plan.table).map_err(RunError::from)?;
         self.write_files(&rig, &demonstration.trace, plan.raise.peaks.duration_s)?;
         let file = Stored::path_beside(&self.rig);
@@ -219,7 +219,7 @@ pub(crate) fn with_margins(
         with_bar("margins", (Transition::BOTH.len() * MOMENTS) as u64, |done| {
             Transition::BOTH.into_iter().map(|transition| of(transition, done)).collect()
         });
-    both.map_err(|source| Failure::of(&rig.name, source))
+    both.map_err(|source| Failure::of_rig(&rig.name, source))
 }
 
 /// Duration, force and robustness of each candidate.

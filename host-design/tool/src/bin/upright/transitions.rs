@@ -211,7 +211,7 @@ struct Judged {
 }
 
 fn failed(rig: &Rig, source: SwingUpError) -> Failure {
-    Failure::of(&rig.name, source)
+    Failure::of_rig(&rig.name, source)
 }
 
 fn searched_line(searched: &Searched, tried: u64, links: usize) -> String {

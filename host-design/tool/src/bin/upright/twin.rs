@@ -62,7 +62,8 @@ pub(crate) struct TwinCommand {
 impl TwinCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        let table = with_stored_motions(&self.variation.rig, &rig, table, Wanted::of(self.transitions))?;
+        let table =
+            with_stored_motions(&self.variation.rig, &rig, table, Wanted::from_option(self.transitions))?;
         let built = match self.port {
             None => Some(self.target.built(&rig, &table)?),
             Some(_) => None,

@@ -91,8 +91,8 @@ impl Variation {
 pub(crate) fn with_table(rig: &Rig, file: &Path, gains: Gains) -> Result<(Certified, TableValues), Failure> {
     let name = || file.display().to_string();
     let certified =
-        with_spinner("designing", || design(rig)).map_err(|source| Failure::of(name(), source))?;
-    let table = TableValues::of(rig, &certified, gains).map_err(|source| Failure::of(name(), source))?;
+        with_spinner("designing", || design(rig)).map_err(|source| Failure::of_rig(name(), source))?;
+    let table = TableValues::of(rig, &certified, gains).map_err(|source| Failure::of_rig(name(), source))?;
     Ok((certified, table))
 }
 
@@ -109,7 +109,7 @@ pub(crate) enum Wanted {
 
 impl Wanted {
     /// What the option `--transitions` asks for.
-    pub(crate) fn of(transitions: bool) -> Self {
+    pub(crate) fn from_option(transitions: bool) -> Self {
         if transitions { Self::Transitions } else { Self::SwingUp }
     }
 }
@@ -124,7 +124,7 @@ pub(crate) fn with_stored_motions(
     if wanted == Wanted::Nothing {
         return Ok(table);
     }
-    let failed = |source| Failure::of(&rig.name, source);
+    let failed = |source| Failure::of_rig(&rig.name, source);
     let stored = match Stored::beside(rig_file) {
         Ok(stored) => stored,
         Err(SwingUpError::NoFile { .. }) if wanted == Wanted::SwingUp => return Ok(table),

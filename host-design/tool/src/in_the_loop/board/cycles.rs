@@ -112,12 +112,12 @@ impl TickCycles {
         Some(Self {
             core_hz,
             period,
-            off: TickFigures::of(&off, core_hz, largest),
-            balancing: TickFigures::of(&balancing, core_hz, largest),
-            typical: TickFigures::of(&balancing, core_hz, median),
-            moving: TickFigures::of(&moving, core_hz, largest),
-            typical_moving: TickFigures::of(&moving, core_hz, median),
-            all: TickFigures::of(&all, core_hz, largest)?,
+            off: TickFigures::from_ticks(&off, core_hz, largest),
+            balancing: TickFigures::from_ticks(&balancing, core_hz, largest),
+            typical: TickFigures::from_ticks(&balancing, core_hz, median),
+            moving: TickFigures::from_ticks(&moving, core_hz, largest),
+            typical_moving: TickFigures::from_ticks(&moving, core_hz, median),
+            all: TickFigures::from_ticks(&all, core_hz, largest)?,
             ended: balances.ended.or(moves.ended),
         })
     }
@@ -134,7 +134,7 @@ fn median(times: &mut [Time]) -> Option<Time> {
 
 impl TickFigures {
     /// The figures of these ticks; `choose` picks each from its values in all ticks.
-    fn of(ticks: &[TickCost], core_hz: u32, choose: fn(&mut [Time]) -> Option<Time>) -> Option<Self> {
+    fn from_ticks(ticks: &[TickCost], core_hz: u32, choose: fn(&mut [Time]) -> Option<Time>) -> Option<Self> {
         let span = |time: Time| {
             let us = time as f64 / UNITS_PER_MICROSECOND as f64;
             Span { cycles: (us * 1e-6 * f64::from(core_hz)).round() as u32, us }

@@ -39,7 +39,7 @@ pub(crate) struct BuildCommand {
 
 impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::of(self.transitions) };
+        let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
         let image = match self.on.board {
             AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), wanted)?.uf2,
             AnyBoard::F4(board) => {

@@ -38,7 +38,7 @@ pub(crate) struct FlashCommand {
 
 impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::of(self.transitions) };
+        let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
         let board = match self.on.board {
             AnyBoard::Pico(board) => {
                 return copy_to_drive(board, &built_for_pico(board, self.rig.as_deref(), wanted)?.uf2);
