@@ -2,7 +2,7 @@
 //!
 //! Generic code is compiled where its sizes become known. The image is compiled for size and this library for speed,
 //! so what the image calls here is fast, and everything else is small. What several places call, and need not be that
-//! fast, is `#[inline(never)]`: one copy each keeps the image within its limit.
+//! fast, is `#[inline(never)]`: one copy each keeps the image small, and its pass over the flash short.
 
 use super::Firmware;
 use crate::board::{Inputs, Output};

@@ -35,6 +35,6 @@ pub use forbidden::{forbidden_functions, forbidden_in_handlers, wrong_functions}
 pub use pico::{PicoImage, build_pico, check_rig_for_pico};
 pub use pico_board::PicoBoard;
 pub use pico_limits::{PICO_BALANCING_CYCLES, PICO_ENCODERS, PICO_MOTION_CYCLES, PICO_TICK_S, PicoError};
-pub use size::{CODE_LIMIT, ImagePart, PICO_CODE_LIMIT, RAM_LIMIT, Size, SizeError, size};
+pub use size::{ImagePart, Size, SizeError, size};
 pub use stack::{StackBound, StackError, StackLevel, stack_bound};
 pub use uf2::uf2;

@@ -4,15 +4,7 @@ use std::collections::BTreeMap;
 
 use upright_board::{Lines, LinesError};
 
-use super::elf::{ImageChip, Item, LinkedImage, LinkedSection};
-
-/// Limit of an image's code (bytes): its flash without constants, among them the motions, and without the gain table.
-/// An eighth of the flash of the smallest of these boards (STM32F446): the rest is for motions.
-pub const CODE_LIMIT: u32 = 64 * 1024;
-/// The same for a Pico, whose code holds a USB device and arithmetic with f32: a sixteenth of its flash.
-pub const PICO_CODE_LIMIT: u32 = 128 * 1024;
-/// Limit of its static RAM (bytes): its variables, not counting the stack and the gain table.
-pub const RAM_LIMIT: u32 = 8 * 1024;
+use super::elf::{Item, LinkedImage, LinkedSection};
 
 /// Name of the gain table: its values are in flash, and are copied to RAM at start-up.
 const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";
@@ -35,8 +27,6 @@ pub struct Size {
     pub table: u32,
     /// Code and constants that run from RAM, in flash and again in RAM.
     pub copied: u32,
-    /// Limit of the code.
-    pub code_limit: u32,
     /// By section, in the order of addresses.
     pub sections: Vec<ImagePart>,
     /// By crate, the largest first. Code belongs to the crate of its source line, also where it is inlined.
@@ -44,12 +34,12 @@ pub struct Size {
 }
 
 impl Size {
-    /// Flash without the gain table and without constants; the limit is [`Size::code_limit`].
+    /// Flash without the gain table and without constants.
     pub fn code(&self) -> u32 {
         self.flash - self.table - self.constants
     }
 
-    /// Static RAM without the gain table, and without what is copied there; the limit is [`RAM_LIMIT`].
+    /// Static RAM without the gain table, and without what is copied there.
     pub fn variables(&self) -> u32 {
         self.ram - self.table - self.copied
     }
@@ -117,11 +107,7 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
     let constants = sections.iter().filter(|part| part.name == CONSTANTS).map(|part| part.flash).sum();
     let copied =
         image.sections.iter().filter(|section| is_copied(section)).map(|section| section.bytes).sum();
-    let code_limit = match image.chip {
-        ImageChip::F4 => CODE_LIMIT,
-        ImageChip::Rp2040 | ImageChip::Rp2350 => PICO_CODE_LIMIT,
-    };
-    Ok(Size { flash, constants, ram, table, copied, code_limit, sections, crates })
+    Ok(Size { flash, constants, ram, table, copied, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

@@ -10,7 +10,7 @@ use upright_design::export::{CALLING, header_faults};
 use upright_test_support::limits::output;
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
-use upright_tool::image::{BoardName, CODE_LIMIT, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, RAM_LIMIT};
+use upright_tool::image::{BoardName, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
 use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
@@ -319,16 +319,6 @@ fn ticks_of_a_pico() -> String {
 #[test]
 fn the_page_about_the_pico_holds_the_ticks_of_the_source() {
     hold("docs/results/pico.md", "ticks", &ticks_of_a_pico());
-}
-
-#[test]
-fn the_page_about_the_board_names_the_limits_of_the_image() {
-    let limits = |code: u32, ram: u32| {
-        format!("more than {} KiB of code or {} KiB of static RAM", code / 1024, ram / 1024)
-    };
-    let page = read("docs/board.md");
-    assert!(page.contains(&limits(CODE_LIMIT, RAM_LIMIT)));
-    assert!(!page.contains(&limits(2 * CODE_LIMIT, RAM_LIMIT)));
 }
 
 /// Name, number of links and ticks of each board.

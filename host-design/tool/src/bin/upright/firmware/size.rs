@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright_tool::image::{
-    ImagePart, LinkedImage, RAM_LIMIT, StackBound, StackError, forbidden_functions, size, stack_bound,
-    wrong_functions,
+    ImagePart, LinkedImage, StackBound, StackError, forbidden_functions, size, stack_bound, wrong_functions,
 };
 
 use super::board::{AnyBoard, AnyBoardOption};
@@ -17,9 +16,9 @@ use crate::output::print;
 use crate::variation::Wanted;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
-/// panic; exit status 1 if, without its tables, it takes more than 64 KiB of code or 8 KiB of static RAM, if it takes
-/// more than 5 KiB of stack, or if it can panic or allocate. The image of a Pico or Pico 2 may take 128 KiB of code and
-/// 8 KiB of stack; its crates for USB can panic, and its exit status is 1 if an interrupt can, such as the tick.
+/// panic; exit status 1 if it may take more stack than is reserved, or if it can panic or allocate. An image that does
+/// not fit the flash and the RAM of its chip is not even linked. The crates for USB in the image of a Pico can panic;
+/// there, the exit status is 1 if an interrupt can, such as the tick.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
@@ -51,7 +50,7 @@ impl SizeCommand {
         };
         let image = LinkedImage::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
-        let wrong = wrong(&size, &stack, &wrong_functions(&image).unwrap_or_default());
+        let wrong = wrong(&stack, &wrong_functions(&image).unwrap_or_default());
         let object = json!({
             "image": path,
             "flash": size.flash,
@@ -59,7 +58,6 @@ impl SizeCommand {
             "table": size.table,
             "constants": size.constants,
             "copied": size.copied,
-            "limits": { "code": size.code_limit, "ram": RAM_LIMIT },
             "sections": size.sections,
             "crates": size.crates,
             "stack": stack.as_ref().ok(),
@@ -72,21 +70,13 @@ impl SizeCommand {
 }
 
 /// The violated limits, as text.
-fn wrong(
-    size: &upright_tool::image::Size,
-    stack: &Result<StackBound, StackError>,
-    forbidden: &[&str],
-) -> Vec<String> {
+fn wrong(stack: &Result<StackBound, StackError>, forbidden: &[&str]) -> Vec<String> {
     let mut wrong = Vec::new();
-    let mut limit = |what: &str, bytes: u32, limit: u32| {
-        if bytes > limit {
-            wrong.push(format!("{what}: {bytes} bytes, {} above the limit of {limit}", bytes - limit));
-        }
-    };
-    limit("code", size.code(), size.code_limit);
-    limit("static RAM without the gain table", size.variables(), RAM_LIMIT);
     match stack {
-        Ok(stack) => limit("stack", stack.bytes, stack.reserved),
+        Ok(StackBound { bytes, reserved, .. }) if bytes > reserved => {
+            wrong.push(format!("stack: {bytes} bytes, {} above the limit of {reserved}", bytes - reserved));
+        }
+        Ok(_) => {}
         Err(error) => wrong.push(error.to_string()),
     }
     if !forbidden.is_empty() {
@@ -110,7 +100,6 @@ fn table(size: &upright_tool::image::Size, stack: &Result<StackBound, StackError
     let all = [
         ImagePart { name: "sum".to_owned(), flash: size.flash, ram: size.ram },
         ImagePart { name: "without tables".to_owned(), flash: size.code(), ram: size.variables() },
-        ImagePart { name: "limit of that".to_owned(), flash: size.code_limit, ram: RAM_LIMIT },
     ];
     rows("image (bytes)", &all);
     if let Ok(stack) = stack {
@@ -134,27 +123,13 @@ fn short(name: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use upright_tool::image::CODE_LIMIT;
 
     #[test]
-    fn a_byte_above_a_limit_is_reported_and_one_below_is_not() {
-        let size = |code: u32, variables: u32| upright_tool::image::Size {
-            flash: code + 1368 + 100_000,
-            constants: 100_000,
-            ram: variables + 1368,
-            table: 1368,
-            copied: 0,
-            code_limit: CODE_LIMIT,
-            sections: Vec::new(),
-            crates: Vec::new(),
+    fn a_byte_above_what_is_reserved_is_reported_and_one_below_is_not() {
+        let wrong = |bytes| {
+            let stack = Ok(StackBound { bytes, reserved: 5120, levels: Vec::new() });
+            wrong(&stack, &[]).len()
         };
-        let wrong = |code, variables, stack| {
-            let stack = Ok(StackBound { bytes: stack, reserved: 5120, levels: Vec::new() });
-            wrong(&size(code, variables), &stack, &[]).len()
-        };
-        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, 5120), 0);
-        assert_eq!(wrong(CODE_LIMIT + 1, RAM_LIMIT, 5120), 1);
-        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT + 1, 5120), 1);
-        assert_eq!(wrong(CODE_LIMIT, RAM_LIMIT, 5121), 1);
+        assert_eq!([5120, 5121].map(wrong), [0, 1]);
     }
 }
