@@ -243,7 +243,7 @@ fn every_key_of_the_monitor_is_listed_with_the_line_that_does_the_same() {
 
 /// Names and meanings in the trust report; a name that ends in a space is followed by a link or a source.
 fn quantities() -> String {
-    let rows = upright_trust::verify::quantities().map(|quantity| {
+    let rows = upright_trust::verify::QUANTITIES.iter().map(|quantity| {
         let more = if quantity.name.ends_with(' ') { "…" } else { "" };
         format!("| `{}{more}` | {} |\n", quantity.name, quantity.meaning)
     });

@@ -209,7 +209,7 @@ fn the_documentation_lists_every_row_with_its_meaning() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/trust.md");
     let page = std::fs::read_to_string(file).unwrap();
     let has = |name: &str, meaning: &str| page.contains(&format!("| `{name}` | {meaning} |"));
-    for quantity in upright_trust::verify::quantities() {
+    for quantity in upright_trust::verify::QUANTITIES {
         let several = quantity.name.strip_suffix(' ').map(|name| format!("{name} …"));
         let name = several.as_deref().unwrap_or(quantity.name);
         assert!(has(name, quantity.meaning), "docs/trust.md: | `{name}` | {} |", quantity.meaning);

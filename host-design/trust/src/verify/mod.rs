@@ -13,6 +13,7 @@ mod encoder;
 mod error;
 mod imperfections;
 mod lag;
+mod law;
 mod linear;
 mod loop_model;
 mod margins;
@@ -23,7 +24,6 @@ mod pushes;
 mod report;
 mod response;
 mod rounding;
-mod rows;
 mod tick;
 mod trial;
 
@@ -50,6 +50,7 @@ pub use imperfections::{
     Survival, imperfections, limit_cycle, of_size, required_imperfections, survival,
 };
 pub use lag::LagLimits;
+pub use law::{FoundRow, LawTrust, QUANTITIES, TrustQuantity, rows};
 pub use linear::{LinearReport, linear, margins_of};
 pub use loop_model::{ControllerModel, LoopModel, PlantModel};
 pub use margins::Margins;
@@ -58,9 +59,8 @@ pub use monte_carlo::{
 };
 pub use noise_runs::{Endurance, LimitShare, MeasuredRipple, NoiseRun, corner_noise, endurance, noise_run};
 pub use pushes::{PushSearch, PushSurvival, pushes};
-pub use report::{Check, LawTrust, TrustReport, brief, trust};
+pub use report::{Check, TrustReport, brief, trust};
 pub use response::Response;
 pub use rounding::Rounding;
-pub use rows::{FoundRow, TrustQuantity, quantities, rows};
 pub use tick::TickLimits;
 pub use trial::{Horizon, Outcome, at_rest_disturbed, moving, trial, trials};

@@ -3,18 +3,12 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use super::corners::MOST_LINKS;
-use super::{
-    Attraction, AttractionSettings, CoarsestEncoder, CornerSettings, Corners, Effort, EncoderSettings,
-    ImperfectionSettings, LinearReport, Margins, MassTolerance, MonteCarlo, NoiseRun, PushSurvival,
-    RequiredSurvival, VerifyError, attraction, coarsest_encoder, corner_noise, corners, linear,
-    mass_tolerances, monte_carlo, noise_run, pushes, required_imperfections, spread,
-};
+use super::law::{law_trust, noise};
+use super::{Effort, LawTrust, Margins, VerifyError, linear};
 use upright_design::design::Certified;
 use upright_design::number::significant;
 use upright_design::parallel::{Progress, ProgressStep};
 use upright_design::rig::{Requirements, Rig};
-use upright_design::simulate::Disturbance;
 use upright_design::table::TableValues;
 
 /// The trust report of a rig.
@@ -24,32 +18,6 @@ pub struct TrustReport {
     pub laws: Vec<LawTrust>,
     /// Every requirement and the value found.
     pub checks: Vec<Check>,
-}
-
-/// What was found for one law. Parts for which a rig has no data (masses of a `[model]`, encoders) are none, and so
-/// are the runs of an unstable loop.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LawTrust {
-    /// Margins, tick, noise, rounding, certificates.
-    pub linear: LinearReport,
-    /// Largest tilts and step.
-    pub attraction: Option<Attraction>,
-    /// Pushes by hand.
-    pub pushes: Vec<PushSurvival>,
-    /// Ripple in simulated runs with noise.
-    pub noise_run: Option<NoiseRun>,
-    /// The same at the corners of `[robust]`; none without `[robust]`.
-    pub corner_noise: Option<NoiseRun>,
-    /// The coarsest encoder.
-    pub coarsest_encoder: Option<CoarsestEncoder>,
-    /// Runs with every combination of mass errors.
-    pub corners: Option<Corners>,
-    /// Tolerated error of each single mass, the most critical first.
-    pub mass_tolerances: Vec<MassTolerance>,
-    /// Runs with random plants.
-    pub monte_carlo: Option<MonteCarlo>,
-    /// Imperfections of the machine that `[verify]` requires the loop to survive.
-    pub imperfections: Vec<RequiredSurvival>,
 }
 
 impl TrustReport {
@@ -114,88 +82,6 @@ pub fn brief(rig: &Rig, certified: &Certified, table: &TableValues) -> Result<Tr
     }
     let checks = laws.iter().flat_map(|law| checks(rig, law)).collect();
     Ok(TrustReport { laws, checks })
-}
-
-/// Runs with noise on the machine of `[reality]`.
-fn noise(rig: &Rig, table: &TableValues, law: Law) -> Result<Option<NoiseRun>, VerifyError> {
-    known(noise_run(rig, table, law, &Disturbance::of(rig), 4, 20.0))
-}
-
-impl LawTrust {
-    /// A report with the linear part only.
-    fn of(linear: LinearReport) -> Self {
-        Self {
-            linear,
-            attraction: None,
-            pushes: Vec::new(),
-            noise_run: None,
-            corner_noise: None,
-            coarsest_encoder: None,
-            corners: None,
-            mass_tolerances: Vec::new(),
-            monte_carlo: None,
-            imperfections: Vec::new(),
-        }
-    }
-}
-
-fn law_trust(
-    rig: &Rig,
-    table: &TableValues,
-    linear: LinearReport,
-    effort: Effort<'_>,
-    progress: Progress<'_>,
-) -> Result<LawTrust, VerifyError> {
-    let stage = |name| progress(ProgressStep::Begin(name, 1));
-    let law = linear.law;
-    let is_chain = rig.chain().is_some();
-    let mut trust = LawTrust::of(linear);
-    if !trust.linear.stable {
-        return Ok(trust);
-    }
-    stage("region of attraction");
-    trust.attraction = known(attraction(rig, table, law, &AttractionSettings::default()))?;
-    if is_chain {
-        stage("pushes");
-        trust.pushes = known(pushes(rig, table, law))?.unwrap_or_default();
-    }
-    stage("noise");
-    trust.noise_run = noise(rig, table, law)?;
-    if rig.robust.is_some() && is_chain && rig.links() <= MOST_LINKS {
-        stage("corners of [robust]");
-        trust.corner_noise = known(corner_noise(rig, table, law, &Disturbance::of(rig)))?;
-    }
-    if table.observer.is_some() && is_chain {
-        stage("coarsest encoder");
-        trust.coarsest_encoder = known(coarsest_encoder(rig, law, &EncoderSettings::of(rig)))?;
-    }
-    // With more links there are too many combinations to try.
-    if is_chain && rig.links() <= MOST_LINKS {
-        stage("mass errors");
-        let settings = CornerSettings::of(rig);
-        trust.corners = known(corners(rig, table, law, rig.verify.corner_percent, &settings))?;
-        let mut tolerances = known(mass_tolerances(rig, table, law, &settings))?.unwrap_or_default();
-        tolerances.sort_by(|one, other| one.percent().total_cmp(&other.percent()));
-        trust.mass_tolerances = tolerances;
-    }
-    if is_chain {
-        stage("imperfections");
-        let found = required_imperfections(rig, table, law, &ImperfectionSettings::of(rig));
-        trust.imperfections = known(found)?.unwrap_or_default();
-        progress(ProgressStep::Begin("random plants", effort.runs as u64));
-        let done = || progress(ProgressStep::Done);
-        trust.monte_carlo = known(monte_carlo(rig, table, law, &spread(rig, effort.late), &effort, &done))?;
-    }
-    Ok(trust)
-}
-
-/// A part for which the rig file has no data is left out; any other failure is an error.
-fn known<T>(part: Result<T, VerifyError>) -> Result<Option<T>, VerifyError> {
-    match part {
-        Ok(part) => Ok(Some(part)),
-        Err(VerifyError::NotAChain(_) | VerifyError::NoObserver) => Ok(None),
-        Err(error) => Err(error),
-    }
 }
 
 impl Check {
