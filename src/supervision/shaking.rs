@@ -170,13 +170,12 @@ impl<const NY: usize> Shaker<NY> {
                 return Ok(None);
             }
         }
-        let Shaking { largest_input, stiffness, damping } = self.shaking;
-        let wanted = largest_input * f32::from(pushed) / f32::from(FULL)
+        let Shaking { largest_input: most, stiffness, damping } = self.shaking;
+        let wanted = most * f32::from(pushed) / f32::from(FULL)
             - stiffness * position_m
             - damping * self.speed_m_per_s;
-        let change =
-            saturate(saturate(wanted, largest_input) - self.force_n, SLEW_PER_S * tick_s * largest_input);
-        self.force_n = saturate(self.force_n + change, largest_input);
+        let change = saturate(saturate(wanted, most) - self.force_n, SLEW_PER_S * tick_s * most);
+        self.force_n = saturate(self.force_n + change, most);
         if self.force_n.is_finite() { Ok(Some(self.force_n)) } else { Err((Fault::NotFinite, None)) }
     }
 

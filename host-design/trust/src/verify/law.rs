@@ -1,5 +1,5 @@
-//! What the trust report says of one law: its parts, how each of them is computed, and the rows that show them. The text
-//! report and the page show the rows, and a test compares the documentation with their names and meanings.
+//! What the trust report says of one law: its parts, how each of them is computed, and the rows that show them. The
+//! text report and the page show the rows, and a test compares the documentation with their names and meanings.
 
 use serde::Serialize;
 use upright::table::Law;
