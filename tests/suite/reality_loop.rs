@@ -14,7 +14,7 @@ use upright_design::table::TableValues;
 use upright_trust::verify::{ImperfectionSettings, imperfections, required_imperfections};
 
 fn load(name: &str) -> (Rig, TableValues) {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../rigs/{name}.toml"));
     let rig = Rig::from_path(&file).unwrap();
     let table = table(&rig);
     (rig, table)

@@ -12,7 +12,7 @@ pub(crate) const ALL_RIGS: [&str; 4] =
     ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi", "quadruple-paper"];
 
 pub(crate) fn rig(name: &str) -> Rig {
-    Rig::from_path(format!("{}/../../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap()
+    Rig::from_path(format!("{}/../rigs/{name}.toml", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap()
 }
 
 /// Brings the rig from hanging to balance at the start of `scenario`, releases it, and continues with `test` after the
