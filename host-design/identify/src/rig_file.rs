@@ -3,20 +3,11 @@
 use std::path::Path;
 
 use upright_design::number::rounded;
-use upright_design::rig::{MEASUREMENTS_OF_A_LINK, PerJoint, Rig, RigError, RigText};
+use upright_design::rig::{MEASUREMENTS_OF_A_LINK, ParameterErrors, PerJoint, Rig, RigError, RigText};
 
 use crate::estimated::Identification;
 use crate::parameters::ParameterKind;
 use crate::realise::{Realised, RealisedLink};
-
-/// Errors of masses and lengths in `[reality]`. The identified numbers include them, so they are set to 0.
-const WITHIN: [&str; 5] = [
-    "cart_mass_percent",
-    "link_mass_percent",
-    "link_length_percent",
-    "link_inertia_percent",
-    "parameter_spread_percent",
-];
 
 /// The text of `old` with the identified numbers, with comments and layout as they were, and `note` as first line.
 ///
@@ -43,7 +34,8 @@ pub fn rig_file(
     if let Some(delay) = found.other_delay() {
         text.set("tick.delay_ticks", &delay.to_string())?;
     }
-    for key in WITHIN.map(|key| format!("reality.{key}")) {
+    // The identified numbers include the errors of masses and lengths.
+    for key in ParameterErrors::percentages().map(|key| format!("reality.{key}")) {
         if text.has(&key) {
             text.set(&key, "0")?;
         }

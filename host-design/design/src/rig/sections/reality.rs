@@ -138,6 +138,13 @@ keys! {
     }
 }
 
+impl ParameterErrors {
+    /// Names of the keys that say how far a mass, a length or an inertia is from the file.
+    pub fn percentages() -> impl Iterator<Item = &'static str> {
+        Self::KEYS.iter().filter(|key| key.unit == "%").map(|key| key.name)
+    }
+}
+
 /// How the dry friction of the simulated machine depends on travel and speed. A rig file has no key for it: its
 /// machine has the first. `upright identify --coverage` simulates the others, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
