@@ -1,41 +1,18 @@
-//! What acts on the plant between two ticks: a force that is held, or a drive that imposes the cart's speed.
+//! The plant and its cost over a tick, by what the drive holds in it.
 
 use super::riccati::Cost;
 use super::zero_order_hold::{integrated_quadratic, sampled_cost, zero_order_hold};
 use crate::numerics::{Matrix, Real, exponential};
-use crate::rig::Rig;
+use crate::rig::Held;
 
-/// How the plant's input acts during a tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hold {
-    /// It is constant.
-    Constant,
-    /// An acceleration a: the drive moves the cart at the mean speed that a gives it, since even pulses are a constant
-    /// speed. The cart's speed, and the links' rates with it, jump by half of `a t` at the beginning of the tick and by
-    /// the other half at its end.
-    MeanSpeed,
-    /// An acceleration a: the drive is commanded a constant speed, and the cart approaches it with this lag of first
-    /// order (s), so that it is faster by `a t` after the tick.
-    Lag(f64),
-}
-
-impl Hold {
-    /// That of the rig's drive.
-    pub fn of(rig: &Rig) -> Self {
-        match &rig.actuator.acceleration {
-            None => Self::Constant,
-            Some(drive) if drive.bandwidth_hz.is_none() => Self::MeanSpeed,
-            Some(drive) => Self::Lag(drive.lag_s()),
-        }
-    }
-
+impl Held {
     /// Ad and Bd of `x⁺ = Ad x + Bd u` for `ẋ = a x + b u` and ticks of `t` (s).
     pub fn sampled<R: Real>(self, a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<R>, Matrix<R>) {
         let (ad, held) = zero_order_hold(a, b, t);
         let bd = match self {
-            Self::Constant => held,
+            Self::Force | Self::Voltage { .. } => held,
             Self::MeanSpeed => (&(&ad * b) + b).scaled(&t.scale_by_power_of_two(-1)),
-            Self::Lag(lag_s) => {
+            Self::LaggingSpeed { lag_s } => {
                 let (s, (at_first, decaying)) = (a.rows(), decaying(a, b, t, lag_s));
                 exponential(&decaying.scaled(t)).block(0, s, s, 1).scaled(&at_first)
             }
@@ -47,7 +24,7 @@ impl Hold {
     /// continuous integral of the states' cost, and t times that of the input.
     pub(crate) fn cost<R: Real>(self, a: &Matrix<R>, b: &Matrix<R>, cost: &Cost<R>, t: &R) -> Cost<R> {
         match self {
-            Self::Constant => sampled_cost(a, b, cost, t),
+            Self::Force | Self::Voltage { .. } => sampled_cost(a, b, cost, t),
             // After the first half of the jump, `b u t/2`, the state moves freely.
             Self::MeanSpeed => {
                 let free = sampled_cost(a, &Matrix::zeros(a.rows(), b.cols()), cost, t);
@@ -60,7 +37,7 @@ impl Hold {
                     q: free.q,
                 }
             }
-            Self::Lag(lag_s) => {
+            Self::LaggingSpeed { lag_s } => {
                 let (s, (at_first, decaying)) = (a.rows(), decaying(a, b, t, lag_s));
                 let weights = Matrix::zeros(s + 1, s + 1).with_block(0, 0, &cost.q);
                 let integrated = integrated_quadratic(&decaying, &weights, t);
@@ -109,7 +86,7 @@ mod tests {
         let left = libm::exp(-t / lag);
         // v(τ) = v_c (1 - e^(-τ/lag)) with v_c = a t / (1 - e^(-t/lag)).
         let wanted = t / (1.0 - left) * (t - lag * (1.0 - left));
-        let (ad, bd) = Hold::Lag(lag).sampled(&a, &b, &W::from_f64(t));
+        let (ad, bd) = Held::LaggingSpeed { lag_s: lag }.sampled(&a, &b, &W::from_f64(t));
         assert_eq!(ad.to_f64_rows(), [[1.0, 0.5], [0.0, 1.0]]);
         let found = bd.to_f64_rows();
         assert!(
@@ -117,7 +94,7 @@ mod tests {
             "{found:?} {wanted}"
         );
         // A very slow drive is commanded so much that the acceleration hardly changes in a tick.
-        let (_, slow) = Hold::Lag(1e6).sampled(&a, &b, &W::from_f64(t));
+        let (_, slow) = Held::LaggingSpeed { lag_s: 1e6 }.sampled(&a, &b, &W::from_f64(t));
         assert!((slow.to_f64_rows()[0][0] - 0.125).abs() < 1e-7, "{:?}", slow.to_f64_rows());
     }
 
@@ -126,16 +103,20 @@ mod tests {
         let (a, b) = cart();
         let t = W::from_f64(0.5);
         let cost = Cost::new(Matrix::from_diagonal(&[W::one(), W::from_f64(2.0)]), Matrix::identity(1));
-        let entries = |hold: Hold| {
-            let Cost { q, r, s } = hold.cost(&a, &b, &cost, &t);
+        let entries = |held: Held| {
+            let Cost { q, r, s } = held.cost(&a, &b, &cost, &t);
             [q, r, s].map(|m| m.to_f64_rows().concat()).concat()
         };
         let near = |one: Vec<f64>, two: &[f64]| one.iter().zip(two).all(|(x, y)| (x - y).abs() < 1e-5);
-        let constant = entries(Hold::Constant);
-        assert!(near(entries(Hold::Lag(1e6)), &constant), "{:?} {constant:?}", entries(Hold::Lag(1e6)));
+        let constant = entries(Held::Force);
+        assert!(
+            near(entries(Held::LaggingSpeed { lag_s: 1e6 }), &constant),
+            "{:?} {constant:?}",
+            entries(Held::LaggingSpeed { lag_s: 1e6 })
+        );
         // At once faster by u t: ∫ (u t τ)² + 2 (u t)² dτ + t u².
         let r = 0.25 * (0.125 / 3.0 + 2.0 * 0.5) + 0.5;
-        let fast = entries(Hold::Lag(1e-7));
+        let fast = entries(Held::LaggingSpeed { lag_s: 1e-7 });
         assert!((fast[4] - r).abs() < 1e-5, "{fast:?} {r}");
         assert!(!near(fast, &constant));
     }

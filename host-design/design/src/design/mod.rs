@@ -39,7 +39,6 @@ pub use controllability::Reach;
 pub use drive_limits::DriveLimits;
 pub use error::{DesignError, Task};
 pub use governor::setpoint_step;
-pub use hold::Hold;
 pub use kalman::Kalman;
 pub use kalman::add_rounded_motion;
 pub use lag::{lag_s, shares_of_lag};

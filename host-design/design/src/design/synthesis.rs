@@ -2,7 +2,6 @@
 
 use super::diagnosis::{why_no_lqr, why_no_placement};
 use super::error::{DesignError, Task};
-use super::hold::Hold;
 use super::kalman::{Kalman, kalman};
 use super::lag::{
     cost_with_pending, force_last, is_late_alone, is_late_and_lags, lag_s, shares, widened, with_lag,
@@ -118,8 +117,7 @@ impl<R: Real> Design<R> {
     ) -> Result<Self, DesignError> {
         let LinearModel { a, b, torque_inputs } = plant;
         let period = R::from_f64(rig.tick.period_s);
-        let hold = Hold::of(rig);
-        let (ad, bd) = hold.sampled(&a, &b, &period);
+        let (ad, bd) = rig.actuator.held().sampled(&a, &b, &period);
         let lag_s = lag_s(rig);
         let further = usize::from(lag_s > 0.0);
         let output = rig.output();
@@ -165,7 +163,7 @@ impl<R: Real> Design<R> {
         let period = R::from_f64(rig.tick.period_s);
         let of_a_tick = |(a, b): (Matrix<R>, Matrix<R>), cost: Cost<R>| match weights.cost_is_sum {
             true => cost,
-            false => Hold::of(rig).cost(&a, &b, &cost, &period),
+            false => rig.actuator.held().cost(&a, &b, &cost, &period),
         };
         let cost = lqr_cost(weights);
         if !is_late_and_lags(rig) {

@@ -7,42 +7,19 @@ use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 
+use super::drive::{SimulatedDrive, StepDefect, commanded_n};
+use super::driven_cart::DrivenCart;
 use super::error::SimulationError;
 use super::scenario::Scenario;
-use super::sensor::{SimulatedSensor, nearest};
-use super::servo::Servo;
+use super::sensor::SimulatedSensor;
 use crate::plant::{ChainLanes, LARGEST_SHARE, LinearSimulation, MOST_STEPS, Plant};
 use crate::reality::{Driver, RealEncoders, StepMotor, Timing, ideal_chain, real_plant};
-use crate::rig::{Chain, PlantDescription, Rig};
-
-/// What is wrong with a drive that takes pulses. The board counts its pulses whatever it does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum StepDefect {
-    /// It is off: it lets go of a cart that its motor moved; without a motor, the cart stands.
-    Off,
-    /// The cart is stuck.
-    Jammed,
-    /// It misses this share of its pulses.
-    Misses(f64),
-}
+use crate::rig::{Chain, Held, PlantDescription, Rig};
 
 /// The simulated rig: everything outside the controller.
 pub struct Bench {
     plant: Box<dyn Plant>,
-    /// Travel per pulse (m) of a drive that imposes the cart's motion.
-    step_m: Option<f64>,
-    /// Its pulses so far, from position 0.
-    pulses: i64,
-    /// Those that it has missed.
-    missed: i64,
-    /// What is wrong with it in the next tick.
-    step_defect: Option<StepDefect>,
-    /// Its motor, unless it goes where its pulses say.
-    step_motor: Option<StepMotor>,
-    /// A servo that follows late.
-    servo: Option<Servo>,
-    /// Motor and driver, unless the force is the commanded one.
-    driver: Option<Driver>,
+    drive: SimulatedDrive,
     timing: Timing,
     encoders: Option<RealEncoders>,
     sensors: Vec<SimulatedSensor>,
@@ -69,9 +46,8 @@ impl Bench {
     /// # Errors
     /// [`SimulationError`] if the plant cannot be built or a noise level is impossible.
     pub fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
-        let step_motor = StepMotor::of(rig);
         let mut plant: Box<dyn Plant> = match &rig.plant {
-            PlantDescription::Chain(chain) => match &step_motor {
+            PlantDescription::Chain(chain) => match StepMotor::of(rig) {
                 Some(motor) => real_plant(&motor.pulled(chain), rig)?,
                 None => real_plant(chain, rig)?,
             },
@@ -84,19 +60,11 @@ impl Bench {
         };
         let finite =
             |offset: f64| if offset.is_finite() { Ok(offset) } else { Err(SimulationError::Offset(offset)) };
-        let step_m = rig.actuator.acceleration.as_ref().map(|drive| drive.step_m);
-        let servo = Servo::of(rig);
         Ok(Self {
             torques: vec![0.0; plant.disturbances()],
             pull_n_m: vec![0.0; plant.disturbances()],
             plant,
-            step_m,
-            pulses: pulses_at(&scenario.start, step_m, servo.as_ref()),
-            missed: 0,
-            step_defect: None,
-            step_motor,
-            servo,
-            driver: Driver::of(rig),
+            drive: SimulatedDrive::of(rig, &scenario.start),
             timing: Timing::of(rig, scenario.seed),
             encoders: RealEncoders::of(rig),
             sensors: SimulatedSensor::all(rig, scenario.counter_start, &scenario.start),
@@ -130,21 +98,27 @@ impl Bench {
         self.plant.set_state(state);
         self.state.copy_from_slice(state);
         self.sensors.iter_mut().for_each(|sensor| sensor.carry(state[sensor.state]));
-        self.servo.iter_mut().for_each(Servo::rest);
-        self.pulses = pulses_at(state, self.step_m, self.servo.as_ref());
-        self.missed = 0;
+        if let SimulatedDrive::Pulses(pulses) = &mut self.drive {
+            pulses.rest_at(state);
+        }
     }
 
     /// Continues where `before` is, which simulates the same rig with other properties.
     pub fn take_over(&mut self, before: &Self) {
         self.hold(&before.state);
         self.sensors.iter_mut().zip(&before.sensors).for_each(|(sensor, before)| sensor.take_over(before));
-        (self.pulses, self.missed) = (before.pulses, before.missed);
+        if let (SimulatedDrive::Pulses(pulses), SimulatedDrive::Pulses(before)) =
+            (&mut self.drive, &before.drive)
+        {
+            pulses.take_over(before);
+        }
     }
 
     /// Spoils a drive with pulses in the next tick.
     pub fn spoil(&mut self, defect: StepDefect) {
-        self.step_defect = Some(defect);
+        if let SimulatedDrive::Pulses(pulses) = &mut self.drive {
+            pulses.spoil(defect);
+        }
     }
 
     /// Widths of the hardware counters: 32 bits for the cart, 16 for the links.
@@ -165,8 +139,10 @@ impl Bench {
     /// potentiometer; entries without a sensor keep their value.
     pub fn read_counters(&mut self, counters: &mut [u32]) {
         for (index, (counter, sensor)) in counters.iter_mut().zip(&mut self.sensors).enumerate() {
-            if index == 0 && self.step_m.is_some() {
-                *counter = Self::reading(0, self.counter_start.wrapping_add(self.pulses as u32));
+            if index == 0
+                && let SimulatedDrive::Pulses(pulses) = &self.drive
+            {
+                *counter = Self::reading(0, self.counter_start.wrapping_add(pulses.counted() as u32));
                 continue;
             }
             let state = sensor.state;
@@ -230,73 +206,25 @@ impl Bench {
     /// Simulates one tick with the command `drive`, issued at its start; returns the motor's force on the cart at the
     /// start of the tick (N), without the disturbance; 0 for a drive that imposes the cart's motion.
     pub fn tick(&mut self, drive: Drive) -> f64 {
-        if let Some(step_m) = self.step_m {
-            self.step(drive, step_m);
-            return 0.0;
-        }
         let (now, disturbance) = self.begin(drive);
         let before = std::mem::replace(&mut self.acting_drive, now);
+        let (period_s, delay) = (self.period_s, self.delay);
+        let mut cart = DrivenCart {
+            plant: self.plant.as_mut(),
+            state: &mut self.state,
+            torques: &self.torques,
+            period_s,
+            substeps: self.substeps,
+        };
+        if let SimulatedDrive::Pulses(pulses) = &mut self.drive {
+            pulses.tick(drive, now, delay, disturbance, &mut cart);
+            return 0.0;
+        }
         let [latency, rest] = self.timing.next_tick();
         if latency > 0.0 {
-            self.advance(before, disturbance, latency);
+            self.drive.push(before, disturbance, latency, &mut cart);
         }
-        self.advance(now, disturbance, rest)
-    }
-
-    /// Simulates one tick of a drive that imposes the cart's motion by pulses, spread evenly. Without a motor they are
-    /// a constant speed, and forces on the cart change nothing. A drive that is off lets go of a cart that its motor
-    /// moved; without a motor, the cart stands. With a delay, it moves a tick after its pulses were counted.
-    fn step(&mut self, drive: Drive, step_m: f64) {
-        let (now, disturbance) = self.begin(drive);
-        let of = |drive: Drive| if let Drive::Steps(pulses) = drive { Some(pulses) } else { None };
-        let (counted, pulses) = (of(drive).unwrap_or(0), of(now).unwrap_or(0));
-        let defect = self.step_defect.take();
-        let missed = match defect {
-            None => 0.0,
-            Some(StepDefect::Off | StepDefect::Jammed) if self.step_motor.is_some() => 0.0,
-            Some(StepDefect::Off | StepDefect::Jammed) => f64::from(pulses),
-            Some(StepDefect::Misses(share)) => (share * f64::from(pulses)).round(),
-        };
-        let is_on = of(drive).is_some() && defect != Some(StepDefect::Off);
-        let on_the_way = if self.delay { i64::from(pulses) } else { 0 };
-        let (before, arrive) = (self.pulses - self.missed - on_the_way, f64::from(pulses) - missed);
-        self.pulses += i64::from(counted);
-        self.missed += missed as i64;
-        let speed = arrive * step_m / self.period_s;
-        let Some(motor) = &self.step_motor else {
-            if let Some(mut servo) = self.servo.take() {
-                self.follow(speed, &mut servo);
-                self.servo = Some(servo);
-                return;
-            }
-            self.plant.set_cart_speed(speed);
-            self.plant.advance(0.0, &self.torques, self.period_s, self.substeps);
-            self.plant.write_state(&mut self.state);
-            return;
-        };
-        let parts = motor.parts(self.period_s);
-        for part in 0..parts {
-            // Pulse j of n begins at (j + 1/2) / n of the tick.
-            let given = ((part as f64 + 0.5) / parts as f64 * arrive).round() as i64;
-            let commanded = [(before + given) as f64 * step_m, speed];
-            if defect == Some(StepDefect::Jammed) {
-                self.plant.set_cart_speed(0.0);
-            }
-            let force = if is_on { motor.force_n(commanded, [self.state[0], self.state[1]]) } else { 0.0 };
-            self.plant.advance(force + disturbance, &self.torques, self.period_s / parts as f64, 1);
-            self.plant.write_state(&mut self.state);
-        }
-    }
-
-    /// Simulates a tick in which the cart approaches a speed (m/s) as its servo does.
-    fn follow(&mut self, speed: f64, servo: &mut Servo) {
-        let parts = servo.parts(self.period_s, self.substeps);
-        let part_s = self.period_s / parts as f64;
-        for _ in 0..parts {
-            let approached = servo.approach(self.state[1] - speed, part_s);
-            self.plant.advance(approached / part_s, &self.torques, part_s, 1);
-            self.plant.write_state(&mut self.state);
-        }
+        self.drive.push(now, disturbance, rest, &mut cart)
     }
 
     /// Begins a tick with the command `drive`: returns the command that acts in it, which is that of the tick before
@@ -323,7 +251,7 @@ impl Bench {
     pub(super) fn lockstep_chain(rig: &Rig) -> Option<Chain> {
         let chain = rig.chain()?;
         let driver = &rig.reality.driver;
-        let is_simple = rig.actuator.acceleration.is_none()
+        let is_simple = rig.actuator.held() == Held::Force
             && Driver::of(rig).is_none()
             && driver.latency_s == 0.0
             && driver.jitter_s == 0.0;
@@ -345,39 +273,11 @@ impl Bench {
 
     /// The supply voltage, as a share of the voltage without load.
     pub fn supply_share(&self) -> f64 {
-        self.driver.as_ref().map_or(1.0, Driver::supply_share)
-    }
-
-    /// Simulates a part of a tick of `length_s` (s), in which the command does not change; returns the motor's force
-    /// at its start (N).
-    fn advance(&mut self, drive: Drive, disturbance: f64, length_s: f64) -> f64 {
-        let substeps = self.substeps_in(length_s);
-        let Some(driver) = &mut self.driver else {
-            let force = commanded_n(drive);
-            self.plant.advance(force + disturbance, &self.torques, length_s, substeps);
-            self.plant.write_state(&mut self.state);
-            return force;
-        };
-        let acting = driver.acting(drive, disturbance);
-        let at_start = acting.first_n(motor_speed(self.plant.as_ref(), &self.state));
-        self.plant.advance_with(&acting, &self.torques, length_s, substeps);
-        self.plant.write_state(&mut self.state);
-        driver.finish(drive, length_s, motor_speed(self.plant.as_ref(), &self.state));
-        at_start
-    }
-
-    /// Number of integration steps in a part of a tick, in proportion to its length (s).
-    fn substeps_in(&self, length_s: f64) -> usize {
-        if length_s == self.period_s {
-            return self.substeps;
+        match &self.drive {
+            SimulatedDrive::Driver(driver) => driver.supply_share(),
+            SimulatedDrive::Force | SimulatedDrive::Pulses(_) => 1.0,
         }
-        (self.substeps as f64 * length_s / self.period_s).ceil().max(1.0) as usize
     }
-}
-
-/// Speed of the motor, converted to speed of the cart (m/s).
-fn motor_speed(plant: &dyn Plant, state: &[f64]) -> f64 {
-    plant.motor_speed().or(state.get(1).copied()).unwrap_or_default()
 }
 
 /// Checks that a motor's speed can be followed within a tick.
@@ -393,18 +293,4 @@ fn can_be_followed(rig: &Rig, plant: &dyn Plant) -> Result<(), SimulationError> 
         period_s,
         speed_m_per_s: motor.supply_v / motor.volts_per_speed(),
     })
-}
-
-/// Force on the cart (N) of a drive without a motor, which produces the commanded one.
-fn commanded_n(drive: Drive) -> f64 {
-    match drive {
-        Drive::Force(force) => f64::from(force),
-        Drive::Duty(_) | Drive::Steps(_) => 0.0,
-    }
-}
-
-/// The pulses that have been given to a drive whose cart is in this state: a servo's cart is behind its command.
-fn pulses_at(state: &[f64], step_m: Option<f64>, servo: Option<&Servo>) -> i64 {
-    let lag_s = servo.map_or(0.0, Servo::lag_s);
-    step_m.map_or(0, |step_m| nearest((state[0] + lag_s * state[1]) / step_m))
 }

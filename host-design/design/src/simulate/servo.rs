@@ -1,6 +1,7 @@
 //! A servo that follows the speed of its pulses late.
 
-use crate::rig::{AccelerationDrive, Rig};
+use super::driven_cart::DrivenCart;
+use crate::rig::{Held, Rig, lag_at};
 
 /// Parts of a servo's time constant in which the acceleration of the cart is taken as constant, and the most of a tick.
 const PARTS_OF_A_LAG: f64 = 10.0;
@@ -20,11 +21,14 @@ pub(super) struct Servo {
 }
 
 impl Servo {
-    /// The servo in the real machine; none if the drive follows at once, or if its motor is described.
+    /// The servo in the real machine; none if the cart follows at once.
     pub(super) fn of(rig: &Rig) -> Option<Self> {
-        let described = rig.actuator.acceleration.as_ref()?;
         let real = &rig.reality.step_motor;
-        let lag_s = real.bandwidth_hz.or(described.bandwidth_hz).map(AccelerationDrive::lag_at)?;
+        let lag_s = match (real.bandwidth_hz, rig.actuator.held()) {
+            (Some(bandwidth_hz), Held::MeanSpeed | Held::LaggingSpeed { .. }) => lag_at(bandwidth_hz),
+            (None, Held::LaggingSpeed { lag_s }) => lag_s,
+            _ => return None,
+        };
         let damping = real.servo_damping_percent.map(|percent| 0.01 * percent);
         Some(Self { rate: 1.0 / lag_s, damping, acceleration: 0.0 })
     }
@@ -39,13 +43,23 @@ impl Servo {
         self.acceleration = 0.0;
     }
 
+    /// Simulates a tick in which the cart approaches a speed (m/s).
+    pub(super) fn follow(&mut self, speed: f64, cart: &mut DrivenCart<'_>) {
+        let parts = self.parts(cart.period_s, cart.substeps);
+        let part_s = cart.period_s / parts as f64;
+        for _ in 0..parts {
+            let approached = self.approach(cart.state[1] - speed, part_s);
+            cart.advance(approached / part_s, part_s, 1);
+        }
+    }
+
     /// Parts of a time (s), at least `least`, in which the acceleration is taken as constant.
-    pub(super) fn parts(&self, length_s: f64, least: usize) -> usize {
+    fn parts(&self, length_s: f64, least: usize) -> usize {
         (PARTS_OF_A_LAG * length_s * self.rate).ceil().clamp(least as f64, MOST_PARTS) as usize
     }
 
     /// Change of the cart's speed (m/s) in the next `part_s` (s) if it is `ahead` (m/s) of the commanded one, exactly.
-    pub(super) fn approach(&mut self, ahead: f64, part_s: f64) -> f64 {
+    fn approach(&mut self, ahead: f64, part_s: f64) -> f64 {
         let Some(damping) = self.damping else { return libm::expm1(-part_s * self.rate) * ahead };
         let (decay, swing) = (damping * self.rate, self.rate * libm::sqrt(1.0 - damping * damping));
         let left = libm::exp(-decay * part_s);

@@ -4,7 +4,7 @@ use crate::verify::{
     ControllerModel, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary, wrong_masses,
 };
 use upright_design::design::{
-    Design, DesignError, Hold, Kalman, continuous_plant, integrated_quadratic, lag_s, noise_columns, with_lag,
+    Design, DesignError, Kalman, continuous_plant, integrated_quadratic, lag_s, noise_columns, with_lag,
 };
 use upright_design::numerics::Matrix;
 use upright_design::reality::first_mass;
@@ -97,7 +97,7 @@ impl<'a> LinearPlants<'a> {
                 let (a, b) = with_lag(&plant.a, &plant.b, lag_s(rig));
                 return Ok(PlantModel::delayed(&a, &b, period_s, delay_ticks, &rig.measurement()));
             }
-            Ok(held(rig, &Hold::of(rig).sampled(&plant.a, &plant.b, &period_s)))
+            Ok(held(rig, &rig.actuator.held().sampled(&plant.a, &plant.b, &period_s)))
         };
         (0..corners).map(corner).collect()
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::super::error::RigError;
+use super::super::held::{Held, lag_at};
 use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
@@ -68,7 +69,19 @@ pub struct Actuator {
 impl Actuator {
     /// What the drive imposes on the cart.
     pub fn input(&self) -> CartInput {
-        if self.acceleration.is_some() { CartInput::Acceleration } else { CartInput::Force }
+        if self.held().is_motion() { CartInput::Acceleration } else { CartInput::Force }
+    }
+
+    /// What the drive holds during a tick.
+    pub fn held(&self) -> Held {
+        match (&self.acceleration, &self.motor) {
+            (Some(drive), _) => match drive.bandwidth_hz {
+                Some(bandwidth_hz) => Held::LaggingSpeed { lag_s: lag_at(bandwidth_hz) },
+                None => Held::MeanSpeed,
+            },
+            (None, Some(motor)) => Held::Voltage { braking_n_s_per_m: motor.braking_n_s_per_m() },
+            (None, None) => Held::Force,
+        }
     }
 }
 
@@ -94,12 +107,7 @@ keys! {
 impl AccelerationDrive {
     /// Time constant (s) with which it follows its speed; 0 without a bandwidth.
     pub fn lag_s(&self) -> f64 {
-        self.bandwidth_hz.map_or(0.0, Self::lag_at)
-    }
-
-    /// Time constant (s) of a lag of first order with this bandwidth (Hz).
-    pub(crate) fn lag_at(bandwidth_hz: f64) -> f64 {
-        1.0 / (core::f64::consts::TAU * bandwidth_hz)
+        self.bandwidth_hz.map_or(0.0, lag_at)
     }
 
     /// Speed above that of the cart which is commanded per acceleration (s), see [`StepMap`](upright::table::StepMap).
