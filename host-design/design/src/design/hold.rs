@@ -6,6 +6,14 @@ use crate::numerics::{Matrix, Real, exponential};
 use crate::rig::Held;
 
 impl Held {
+    /// Loss of force per speed while it is held (N·s/m): by the back-EMF of a motor whose voltage is held.
+    pub fn braking_n_s_per_m(self) -> f64 {
+        match self {
+            Self::Voltage { braking_n_s_per_m } => braking_n_s_per_m,
+            Self::Force | Self::MeanSpeed | Self::LaggingSpeed { .. } => 0.0,
+        }
+    }
+
     /// Ad and Bd of `x⁺ = Ad x + Bd u` for `ẋ = a x + b u` and ticks of `t` (s).
     pub fn sampled<R: Real>(self, a: &Matrix<R>, b: &Matrix<R>, t: &R) -> (Matrix<R>, Matrix<R>) {
         let (ad, held) = zero_order_hold(a, b, t);
@@ -50,6 +58,12 @@ impl Held {
             }
         }
     }
+}
+
+/// A of the plant whose input, a force on the cart, falls by `braking_n_s_per_m` times the speed of the cart (state 1).
+pub fn with_braking(a: &Matrix<f64>, b: &Matrix<f64>, braking_n_s_per_m: f64) -> Matrix<f64> {
+    let loss = |row: usize, column: usize| if column == 1 { braking_n_s_per_m * b[(row, 0)] } else { 0.0 };
+    Matrix::from_fn(a.rows(), a.cols(), |row, column| a[(row, column)] - loss(row, column))
 }
 
 /// The plant whose input decays during the tick as `e^(-τ/lag)`, with the input as a further state, and the input at

@@ -1,6 +1,7 @@
 //! The closed loops of a design and their poles.
 
 use super::error::DesignError;
+use super::hold::with_braking;
 use super::lag::{force_last, is_late_alone, is_late_and_lags, shares, with_lag, with_pending};
 use super::synthesis::{Design, Feedback, with_integral};
 use super::zero_order_hold::zero_order_hold;
@@ -107,6 +108,16 @@ impl<R: Real> Design<R> {
             input[(states, 0)] = -period;
         }
         Some(input)
+    }
+}
+
+impl Design<f64> {
+    /// The design with the plant as it moves while a motor holds its voltage: from the force of that voltage at
+    /// standstill to the state.
+    pub fn braked(&self, braking_n_s_per_m: f64, tick_s: f64) -> Self {
+        let a = with_braking(&self.a, &self.b, braking_n_s_per_m);
+        let (ad, bd) = zero_order_hold(&a, &self.b, &tick_s);
+        Self { a, ad, bd, ..self.clone() }
     }
 }
 

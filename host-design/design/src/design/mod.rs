@@ -39,6 +39,7 @@ pub use controllability::Reach;
 pub use drive_limits::DriveLimits;
 pub use error::{DesignError, Task};
 pub use governor::setpoint_step;
+pub use hold::with_braking;
 pub use kalman::Kalman;
 pub use kalman::add_rounded_motion;
 pub use lag::{lag_s, shares_of_lag};

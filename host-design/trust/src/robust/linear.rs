@@ -4,11 +4,12 @@ use crate::verify::{
     ControllerModel, LoopModel, Numbers, PlantModel, VerifyError, radius, stationary, wrong_masses,
 };
 use upright_design::design::{
-    Design, DesignError, Kalman, continuous_plant, integrated_quadratic, lag_s, noise_columns, with_lag,
+    Design, DesignError, Kalman, continuous_plant, integrated_quadratic, lag_s, noise_columns, with_braking,
+    with_lag,
 };
 use upright_design::numerics::Matrix;
 use upright_design::reality::first_mass;
-use upright_design::rig::{Rig, Sensor, Tolerances};
+use upright_design::rig::{Held, Rig, Sensor, Tolerances};
 use upright_design::simulate::Disturbance;
 
 /// Least distance of the spectral radius from 1: a loop closer to instability falls in a long run.
@@ -44,11 +45,15 @@ impl<'a> LinearPlants<'a> {
         };
         let intensities: Vec<f64> = (0..inputs.cols()).map(intensity).collect();
         let spread = &(&inputs * &Matrix::from_diagonal(&intensities)) * &inputs.transpose();
+        let braked = match rig.actuator.held() {
+            Held::Voltage { braking_n_s_per_m } => &design.braked(braking_n_s_per_m, period_s),
+            Held::Force | Held::MeanSpeed | Held::LaggingSpeed { .. } => design,
+        };
         Ok(Self {
             rig,
             tolerances,
-            nominal: held(rig, &design.driven_sampled(&period_s)),
-            process: integrated_quadratic(&design.a.transpose(), &spread, &period_s),
+            nominal: held(rig, &braked.driven_sampled(&period_s)),
+            process: integrated_quadratic(&braked.a.transpose(), &spread, &period_s),
             sensor_variances: rig.sensors().iter().map(Sensor::variance).collect(),
         })
     }
@@ -93,11 +98,13 @@ impl<'a> LinearPlants<'a> {
             let signs = (0..parts).map(|part| if mask >> part & 1 == 1 { 1.0 } else { -1.0 });
             let factors: Vec<f64> = std::iter::repeat_n(0.0, first).chain(signs).collect();
             let plant = continuous_plant::<f64>(&wrong_masses(rig, tolerances.mass_percent, &factors))?;
-            if rig.actuator.input().is_force() {
-                let (a, b) = with_lag(&plant.a, &plant.b, lag_s(rig));
-                return Ok(PlantModel::delayed(&a, &b, period_s, delay_ticks, &rig.measurement()));
+            let drive = rig.actuator.held();
+            if drive.is_motion() {
+                return Ok(held(rig, &drive.sampled(&plant.a, &plant.b, &period_s)));
             }
-            Ok(held(rig, &rig.actuator.held().sampled(&plant.a, &plant.b, &period_s)))
+            let braked = with_braking(&plant.a, &plant.b, drive.braking_n_s_per_m());
+            let (a, b) = with_lag(&braked, &plant.b, lag_s(rig));
+            Ok(PlantModel::delayed(&a, &b, period_s, delay_ticks, &rig.measurement()))
         };
         (0..corners).map(corner).collect()
     }

@@ -171,7 +171,7 @@ pub const QUANTITIES: &[TrustQuantity] = &[
     TrustQuantity {
         name: "gain margin",
         meaning: "factors by which the real force may constantly differ from the commanded force before the loop is \
-                  unstable; of a stepper, the acceleration",
+                  unstable; of a DC motor, the voltage, and of a stepper, the acceleration",
         values: One(|_, law| {
             let margins = margins(law)?;
             let highest = margins.highest_gain.map_or("any".to_owned(), number);

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use upright::table::Law;
+use upright::table::{DriveMap, Law};
 
 use super::VerifyError;
 use upright_design::design::{Certified, Design, Feedback, Kalman, shares, zero_order_hold};
@@ -22,17 +22,20 @@ pub struct PlantModel<R> {
     states: usize,
 }
 
-/// The controller from measurement to force, `ξ⁺ = A ξ + B y`, `u = C ξ + D y`, with set-point 0.
+/// The controller from measurement to force, `ξ⁺ = A ξ + B y`, `u = C ξ + D y`, with set-point 0, and to what the drive
+/// holds in the tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControllerModel<R> {
     a: Matrix<R>,
     b: Matrix<R>,
-    c: Matrix<R>,
-    d: Matrix<R>,
+    /// C and D of the requested force.
+    force: [Matrix<R>; 2],
+    /// C and D of what the drive holds: that force, or the force of its voltage at standstill.
+    held: [Matrix<R>; 2],
 }
 
-/// The closed loop `ζ⁺ = M ζ + E w + F v`, `u = C ζ + D v`, with w (N) added to the force and v to the measurement.
-/// The first entries of ζ are the plant's states.
+/// The closed loop `ζ⁺ = M ζ + E w + F v`, `u = C ζ + D v`, with w (N) added to what the drive holds and v to the
+/// measurement. The first entries of ζ are the plant's states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopModel<R> {
     /// M.
@@ -45,6 +48,8 @@ pub struct LoopModel<R> {
     pub force_output: Matrix<R>,
     /// D: effect of a sensor's error on the force in the same tick.
     pub sensor_to_force: Matrix<R>,
+    /// What the drive holds, from ζ: the requested force, or with a motor the force of its voltage at standstill.
+    pub held_output: Matrix<R>,
     /// Number of states of the plant.
     pub states: usize,
 }
@@ -63,6 +68,8 @@ pub(crate) struct Numbers<R> {
     pub(super) tick_s: R,
     /// Shares of the pending force: in the mean force of a tick, and left for the next one.
     pub(super) pending: [R; 2],
+    /// Loss of force per speed of a motor that holds its voltage during the tick (N·s/m); 0 if the force is held.
+    pub(super) braking: R,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -98,6 +105,10 @@ impl<R: Real> Numbers<R> {
             output: table.output as usize,
             tick_s: exact(table.tick_s),
             pending: [exact(late.acts), exact(late.stays)],
+            braking: match &table.drive {
+                DriveMap::Volts(motor) => exact(motor.volts_per_speed) / &exact(motor.volts_per_newton),
+                DriveMap::Force(_) | DriveMap::Pulses(_) => R::zero(),
+            },
         })
     }
 
@@ -142,6 +153,7 @@ impl<R: Real> Numbers<R> {
             output: rig.output(),
             tick_s: R::from_f64(rig.tick.period_s),
             pending: shares(rig, rig.tick.period_s).map(R::from_f64),
+            braking: R::from_f64(rig.actuator.held().braking_n_s_per_m()),
         })
     }
 
@@ -230,7 +242,8 @@ impl<R: Real> ControllerModel<R> {
     /// x̂⁻⁺ = Ad x̂ + Bd (α u_pending + (1-α) u),   z⁺ = z + T x̂_output,   u_pending⁺ = β u_pending + (1-β) u
     /// ```
     ///
-    /// α and β are `acts` and `stays` of the table's [`Late`](upright::table::Late).
+    /// α and β are `acts` and `stays` of the table's [`Late`](upright::table::Late). A motor gets the voltage that
+    /// gives u at the estimated speed, and holds it.
     pub(crate) fn of(numbers: &Numbers<R>) -> Self {
         let (s, p) = (numbers.k.cols(), numbers.c.rows());
         let [acts, stays] = &numbers.pending;
@@ -278,7 +291,13 @@ impl<R: Real> ControllerModel<R> {
             a = a.with_block(pending, 0, &left.0);
             b = b.with_block(pending, 0, &left.1);
         }
-        Self { a, b, c, d }
+        // At a cart with one more state there is a speed to make up for.
+        let with_braking = |force: &Matrix<R>, estimate: &Matrix<R>| match s {
+            ..2 => force.clone(),
+            _ => force + &estimate.block(1, 0, 1, estimate.cols()).scaled(&numbers.braking),
+        };
+        let held = [with_braking(&c, &from_memory), with_braking(&d, &from_sensors)];
+        Self { a, b, force: [c, d], held }
     }
 }
 
@@ -286,15 +305,17 @@ impl<R: Real> LoopModel<R> {
     /// Closes the loop of plant and controller.
     pub fn of(plant: &PlantModel<R>, controller: &ControllerModel<R>) -> Self {
         let (n, m) = (plant.a.rows(), controller.a.rows());
-        let force_output = (&controller.d * &plant.c).beside(&controller.c);
-        let top = &plant.a.beside(&Matrix::zeros(n, m)) + &(&plant.b * &force_output);
+        let output = |[c, d]: &[Matrix<R>; 2]| (d * &plant.c).beside(c);
+        let held_output = output(&controller.held);
+        let top = &plant.a.beside(&Matrix::zeros(n, m)) + &(&plant.b * &held_output);
         let below = (&controller.b * &plant.c).beside(&controller.a);
         Self {
             matrix: top.above(&below),
             force_input: plant.b.above(&Matrix::zeros(m, 1)),
-            sensor_input: (&plant.b * &controller.d).above(&controller.b),
-            force_output,
-            sensor_to_force: controller.d.clone(),
+            sensor_input: (&plant.b * &controller.held[1]).above(&controller.b),
+            force_output: output(&controller.force),
+            sensor_to_force: controller.force[1].clone(),
+            held_output,
             states: plant.states,
         }
     }
@@ -313,19 +334,26 @@ impl<R: Real> LoopModel<R> {
     }
 }
 
-/// The design with the plant that `numbers` control. An observer that does not correct by the first sensor takes the
-/// cart's position and speed from the commands alone: where the cart really is changes nothing in the loop, so that it
-/// must not look like two poles at 1. Its rows decay within a tick.
+/// The design with the plant that `numbers` control, from what the drive holds.
 pub(super) fn seen_plant<'a, R: Real>(certified: &'a Certified, numbers: &Numbers<R>) -> Cow<'a, Certified> {
+    if !numbers.braking.is_zero() {
+        let mut braked = certified.clone();
+        braked.double = braked.double.braked(numbers.braking.to_f64(), numbers.tick_s.to_f64());
+        return Cow::Owned(braked);
+    }
     let is_unseen = numbers.observer.as_ref().is_some_and(|observer| {
         let column = observer.l.block(0, 0, observer.l.rows(), 1);
         column.entries().iter().all(R::is_zero)
     });
-    if !is_unseen {
-        return Cow::Borrowed(certified);
-    }
+    if is_unseen { Cow::Owned(unseen(certified, numbers.tick_s.to_f64())) } else { Cow::Borrowed(certified) }
+}
+
+/// An observer that does not correct by the first sensor takes the cart's position and speed from the commands alone:
+/// where the cart really is changes nothing in the loop, so that it must not look like two poles at 1. Its rows decay
+/// within a tick.
+fn unseen(certified: &Certified, tick_s: f64) -> Certified {
     let mut seen = certified.clone();
-    let (design, rate) = (&mut seen.double, -1.0 / numbers.tick_s.to_f64());
+    let (design, rate) = (&mut seen.double, -1.0 / tick_s);
     for cart in 0..2 {
         for column in 0..design.a.cols() {
             (design.a[(cart, column)], design.ad[(cart, column)]) = (0.0, 0.0);
@@ -333,7 +361,7 @@ pub(super) fn seen_plant<'a, R: Real>(certified: &'a Certified, numbers: &Number
         design.a[(cart, cart)] = rate;
         (design.b[(cart, 0)], design.bd[(cart, 0)]) = (0.0, 0.0);
     }
-    Cow::Owned(seen)
+    seen
 }
 
 /// Largest absolute value of a pole of the loop.

@@ -7,11 +7,11 @@ use super::loop_model::LoopModel;
 /// The loop broken at the plant's input, at one frequency, with L(z) = - (controller · plant).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
-    /// S = 1 / (1 + L): from a force disturbance to the force on the plant.
+    /// S = 1 / (1 + L): from a disturbance of what the drive holds to all that it holds.
     pub s: Complex<f64>,
     /// T = L / (1 + L).
     pub t: Complex<f64>,
-    /// From an impulse on each of the plant's states to the law's force.
+    /// From an impulse on each of the plant's states to what the drive holds.
     pub kick_to_force: Vec<Complex<f64>>,
 }
 
@@ -40,7 +40,7 @@ impl LoopModel<f64> {
                     let diagonal = if i == j { z } else { Complex::new(0.0, 0.0) };
                     diagonal - self.matrix[(j, i)]
                 };
-                (0..n).map(entry).chain([Complex::new(self.force_output[(0, i)], 0.0)]).collect()
+                (0..n).map(entry).chain([Complex::new(self.held_output[(0, i)], 0.0)]).collect()
             })
             .collect();
         for k in 0..n {

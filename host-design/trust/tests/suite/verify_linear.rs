@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::published::{certified, table};
 use rand::{RngExt, SeedableRng};
-use upright::table::Law;
+use upright::table::{DriveMap, Law};
 use upright_design::design::Certified;
 use upright_design::numerics::{Matrix, spectral_radius};
 use upright_design::rig::Rig;
@@ -35,6 +35,16 @@ force_noise_n2_s = 1e-4
 joint_noise = [1e-6]
 "#;
 
+/// A motor so strong that its back-EMF takes a third of a jump of the speed within the tick.
+const MOTOR: &str = r#"
+[actuator]
+torque_constant_n_m_per_a = 0.0114
+resistance_ohm = 2.2
+gear_ratio = 10
+pulley_radius_m = 0.006366
+supply_v = 12
+"#;
+
 fn rig(name: &str) -> Rig {
     Rig::from_path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs").join(name)).unwrap()
 }
@@ -57,18 +67,18 @@ fn law(report: &LinearReport) -> Law {
     report.law
 }
 
-/// Spectral radius with the force on the plant multiplied by `re + j im`: `M + (factor - 1) E C`, as a real matrix of
+/// Spectral radius with what the drive holds multiplied by `re + j im`: `M + (factor - 1) E C`, as a real matrix of
 /// twice the size.
 fn radius_with_factor(model: &LoopModel<f64>, re: f64, im: f64) -> f64 {
-    let change = &model.force_input * &model.force_output;
+    let change = &model.force_input * &model.held_output;
     let real = &model.matrix + &change.scaled(&(re - 1.0));
     let imaginary = change.scaled(&im);
     spectral_radius(&real.beside(&-&imaginary).above(&imaginary.beside(&real))).unwrap()
 }
 
-/// Spectral radius with the force delayed by `ticks` whole ticks.
+/// Spectral radius with what the drive holds delayed by `ticks` whole ticks.
 fn radius_with_delay(model: &LoopModel<f64>, ticks: usize) -> f64 {
-    let (n, e, c) = (model.matrix.rows(), &model.force_input, &model.force_output);
+    let (n, e, c) = (model.matrix.rows(), &model.force_input, &model.held_output);
     if ticks == 0 {
         return spectral_radius(&model.matrix).unwrap();
     }
@@ -91,28 +101,35 @@ fn encoder_force_n(rig: &Rig, certified: &Certified, table: &TableValues, of: La
     squares.sum::<f64>().sqrt()
 }
 
+/// Largest difference between the force of `model` and that of the firmware, and largest force (N), from 4 mm on.
+fn difference(model: &LoopModel<f64>, rig: &Rig, table: &TableValues, law: Law) -> [f64; 2] {
+    let mut scenario = Scenario::at_rest(rig, law);
+    // The counters of the links have 16 bits: with a link that leans at the start, they would wrap at once.
+    scenario.start = vec![0.004, 0.0, 0.0, 0.0];
+    scenario.duration_s = 3.0;
+    let (trace, _) = simulate(rig, table, &scenario).unwrap();
+    let mut state = Matrix::zeros(model.matrix.rows(), 1);
+    let observer = 4 + usize::from(rig.tick.delay_ticks);
+    (state[(0, 0)], state[(observer, 0)]) = (0.004, 0.004);
+    let (mut worst, mut peak) = (0.0f64, 0.0f64);
+    for sample in trace.samples() {
+        let force = (&model.force_output * &state)[(0, 0)];
+        worst = worst.max((force - sample.requested).abs());
+        peak = peak.max(force.abs());
+        state = &model.matrix * &state;
+    }
+    [worst, peak]
+}
+
 #[test]
 fn the_model_of_the_loop_moves_as_the_firmware_does() {
-    for (delay, further) in [("0", ""), ("1", ""), ("1", "[integral]\nposition_weight = 50\n")] {
+    for (delay, further) in [("0", ""), ("1", ""), ("1", "[integral]\nposition_weight = 50\n"), ("0", MOTOR)]
+    {
         let rig = model_rig(delay, further);
         let (certified, table) = designed(&rig);
         for law in [Law::Lqr, Law::PolePlacement] {
             let model = LoopModel::<f64>::as_it_runs(certified, &table, law).unwrap();
-            let mut scenario = Scenario::at_rest(&rig, law);
-            // The counters of the links have 16 bits: with a link that leans at the start, they would wrap at once.
-            scenario.start = vec![0.004, 0.0, 0.0, 0.0];
-            scenario.duration_s = 3.0;
-            let (trace, _) = simulate(&rig, &table, &scenario).unwrap();
-            let mut state = Matrix::zeros(model.matrix.rows(), 1);
-            let observer = 4 + usize::from(delay == "1");
-            (state[(0, 0)], state[(observer, 0)]) = (0.004, 0.004);
-            let (mut worst, mut peak) = (0.0f64, 0.0f64);
-            for sample in trace.samples() {
-                let force = (&model.force_output * &state)[(0, 0)];
-                worst = worst.max((force - sample.requested).abs());
-                peak = peak.max(force.abs());
-                state = &model.matrix * &state;
-            }
+            let [worst, peak] = difference(&model, &rig, &table, law);
             // Only the rounding of the encoders is left, with the RMS that the noise model predicts (f32 is finer).
             // A wrong tick of delay or a lost term would be a hundred times larger.
             let rounding = encoder_force_n(&rig, certified, &table, law);
@@ -124,6 +141,24 @@ fn the_model_of_the_loop_moves_as_the_firmware_does() {
             assert!(peak > 0.01);
         }
     }
+}
+
+/// The negative control, and what follows: a motor brakes within the tick, so that a stronger gear takes margins.
+#[test]
+fn a_motor_that_holds_its_voltage_is_not_a_force_that_is_held() {
+    let rig = model_rig("0", MOTOR);
+    let (certified, table) = designed(&rig);
+    let mut held = table.clone();
+    held.drive = DriveMap::Force(*table.drive.force().unwrap());
+    let model = LoopModel::<f64>::as_it_runs(certified, &held, Law::Lqr).unwrap();
+    let [worst, peak] = difference(&model, &rig, &table, Law::Lqr);
+    assert!(worst > 0.02 * peak, "{worst} of {peak}");
+    let phase_rad = |gear: &str| {
+        let report = report(&model_rig("0", &MOTOR.replace("gear_ratio = 10", gear)));
+        report[0].margins.as_ref().unwrap().phase_margin_rad.unwrap()
+    };
+    let [weak, strong] = [phase_rad("gear_ratio = 0.1"), phase_rad("gear_ratio = 10")];
+    assert!(strong < 0.95 * weak, "{strong} {weak}");
 }
 
 #[test]
