@@ -22,7 +22,7 @@ pub(crate) fn stepper(name: &str, weight: f64, period_s: f64) -> Rig {
         step_rate_limit_hz: None,
         bandwidth_hz: None,
     };
-    rig.actuator = Actuator { acceleration: Some(drive), ..Actuator::default() };
+    rig.actuator = Actuator::Pulses(drive);
     rig.tick.period_s = period_s;
     (rig.pole_placement, rig.swing_up, rig.reality) = (None, None, Reality::default());
     rig.lqr.as_mut().unwrap().force_weight = weight;
@@ -155,7 +155,7 @@ fn the_observer_takes_the_cart_from_the_pulses() {
     }
     // Coarser steps make the links' encoders worth less.
     let mut coarse = rig.clone();
-    coarse.actuator.acceleration.as_mut().unwrap().step_m = 1e-4;
+    coarse.actuator.pulses_mut().unwrap().step_m = 1e-4;
     let other = &certified(&coarse).double.kalman.as_ref().unwrap().l_filter;
     assert!(other[(2, 1)] < l[(2, 1)]);
 }
@@ -196,7 +196,7 @@ fn a_quadruple_balances_on_pulses() {
     assert!(summary.survives() && rms <= 3.5, "{rms} {summary}");
     // Negative control: pulses that move the cart twice as far as the table says.
     let mut coarse = rig.clone();
-    coarse.actuator.acceleration.as_mut().unwrap().step_m *= 2.0;
+    coarse.actuator.pulses_mut().unwrap().step_m *= 2.0;
     let (summary, _) = run(&coarse, &table(&rig), &balancing(&rig));
     assert!(!summary.survives(), "{summary}");
 }
@@ -205,7 +205,7 @@ fn a_quadruple_balances_on_pulses() {
 fn a_quadruple_stands_on_pulses_of_100_um_and_falls_on_those_of_150_um() {
     for (step_m, stands) in [(50e-6, true), (100e-6, true), (150e-6, false), (200e-6, false)] {
         let mut rig = quadruple();
-        rig.actuator.acceleration.as_mut().unwrap().step_m = step_m;
+        rig.actuator.pulses_mut().unwrap().step_m = step_m;
         let (summary, rms) = run(&rig, &table(&rig), &balancing(&rig));
         println!("{step_m} m: {rms} m/s² rms, {summary}");
         assert_eq!(summary.survives(), stands, "{step_m} m: {summary}");
@@ -220,7 +220,7 @@ fn the_governor_leaves_half_of_the_drives_limits() {
     rig.chain_mut().unwrap().cart.travel_m = [-1.0, 1.0];
     let step = |rig: &Rig| table(rig).laws.lqr.as_ref().unwrap().setpoint_step;
     let free = step(&rig);
-    let drive = rig.actuator.acceleration.as_mut().unwrap();
+    let drive = rig.actuator.pulses_mut().unwrap();
     (drive.speed_limit_m_per_s, drive.acceleration_limit_m_per_s2) = (Some(0.1), 1.0);
     let slow = step(&rig);
     assert!(slow < free, "{slow} {free}");
@@ -242,7 +242,7 @@ fn the_public_machine_balances_and_follows_its_set_point() {
     println!("{rms} m/s² rms, {summary}");
     assert!(summary.survives() && summary.final_error_m.abs() < 5e-3, "{summary}");
     // The drive's limits hold.
-    let drive = rig.actuator.acceleration.as_ref().unwrap();
+    let drive = rig.actuator.pulses().unwrap();
     assert!(summary.peak_force_n <= drive.acceleration_limit_m_per_s2);
     assert!(summary.to_string().contains("m/s²"), "{summary}");
     // The whole state cannot be measured: the cart's is what the pulses say.

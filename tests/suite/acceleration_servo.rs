@@ -10,7 +10,7 @@ use crate::published::{certified, rig_of, rig_path, table};
 /// The rig in this file with a servo of this bandwidth (Hz).
 fn with_servo(name: &str, bandwidth_hz: f64) -> Rig {
     let mut rig = crate::published::rig(name);
-    rig.actuator.acceleration.as_mut().unwrap().bandwidth_hz = Some(bandwidth_hz);
+    rig.actuator.pulses_mut().unwrap().bandwidth_hz = Some(bandwidth_hz);
     rig
 }
 
@@ -57,7 +57,7 @@ fn the_cart_is_where_the_model_of_the_lag_says() {
         let away = trace.samples().map(|sample| (sample.state[0] - sample.estimate[0]).abs());
         away.fold(0.0, f64::max)
     };
-    let step_m = rig.actuator.acceleration.as_ref().unwrap().step_m;
+    let step_m = rig.actuator.pulses().unwrap().step_m;
     assert!(away(&rig) < step_m, "{}", away(&rig));
     // Negative control: a servo that is faster than stated is elsewhere.
     assert!(away(&really(&rig, 30.0)) > 20.0 * step_m, "{}", away(&really(&rig, 30.0)));
@@ -135,7 +135,7 @@ fn a_bandwidth_belongs_to_a_servo() {
     let stepper = std::fs::read_to_string(rig_path("single-stepper")).unwrap();
     let force = std::fs::read_to_string(rig_path("single-quanser-ip02")).unwrap();
     let servo = stepper.replace("kind = \"acceleration\"", "kind = \"acceleration\"\nbandwidth_hz = 20");
-    assert_eq!(rig_of(&servo).actuator.acceleration.unwrap().bandwidth_hz, Some(20.0));
+    assert_eq!(rig_of(&servo).actuator.pulses().unwrap().bandwidth_hz, Some(20.0));
     assert!(error(&servo.replace("= 20\n", "= -20\n")).contains("actuator.bandwidth_hz: found -20"));
     assert!(error(&force.replace("[actuator]", "[actuator]\nbandwidth_hz = 20")).contains("bandwidth_hz"));
     let damped = format!("{stepper}\n[reality]\nservo_damping_percent = 70\n");

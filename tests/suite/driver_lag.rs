@@ -18,7 +18,7 @@ const RIGS: [&str; 3] = ["single-quanser-ip02", "double-quanser-dbpen", "quadrup
 /// The rig in this file with a force that lags (s).
 fn lagging(name: &str, lag_s: f64) -> Rig {
     let mut rig = crate::published::rig(name);
-    rig.actuator.driver_lag_s = Some(lag_s);
+    rig.actuator.force_mut().unwrap().lag_s = Some(lag_s);
     rig
 }
 
@@ -160,8 +160,9 @@ fn a_tick_of_delay_before_a_lag_is_made_up_for() {
     }
     let rig = late_and_lagging("quadruple-paper", 0.002);
     let [mut at_once, mut delayed] = [&rig, &rig].map(Clone::clone);
-    (at_once.actuator.driver_lag_s, at_once.tick.delay_ticks) = (None, 0);
-    delayed.actuator.driver_lag_s = None;
+    at_once.actuator.force_mut().unwrap().lag_s = None;
+    at_once.tick.delay_ticks = 0;
+    delayed.actuator.force_mut().unwrap().lag_s = None;
     for poor in [&at_once, &delayed] {
         assert!(!run(&really(&rig, 0.002), &table(poor), &balancing(&rig)).0.survives());
     }
@@ -200,7 +201,7 @@ fn a_lag_belongs_to_a_force() {
         text.replace("[actuator]\n", &format!("[actuator]\n{line}\n"))
     };
     let good = text("single-quanser-ip02", "driver_lag_s = 0.002");
-    assert_eq!(crate::published::rig_of(&good).actuator.driver_lag_s, Some(0.002));
+    assert_eq!(crate::published::rig_of(&good).actuator.lag_s(), Some(0.002));
     assert!(
         error(&good.replace("driver_lag_s = 0.002", "driver_lag_s = 0"))
             .contains("actuator.driver_lag_s: found 0")

@@ -15,7 +15,7 @@ const FORCE_NOISE: Disturbance = Disturbance { force_n: 0.1, torque_n_m: 0.0 };
 /// The paper's rig (4096 counts per revolution, 1 kHz) with a force limit of `limit_n`.
 fn paper_with_limit(limit_n: f64) -> Rig {
     let mut rig = rig("quadruple-paper");
-    rig.actuator.force_limit_n = Some(limit_n);
+    rig.actuator.force_mut().unwrap().limit_n = Some(limit_n);
     rig
 }
 
@@ -63,7 +63,7 @@ fn the_quadruple_takes_half_a_metre_through_the_governor_in_noise() {
 fn single_double_and_triple_with_motor_dead_zone_and_friction_take_a_step_through_the_governor() {
     for name in ["single-quanser-ip02", "double-quanser-dbpen", "triple-glueck-eder-kugi"] {
         let rig = rig(name);
-        let motor = rig.actuator.motor.as_ref().unwrap();
+        let motor = rig.actuator.motor().unwrap();
         assert!(motor.dead_zone_v > 0.0, "{name}");
         let table = table(&rig);
         for law in LAWS {
@@ -74,7 +74,7 @@ fn single_double_and_triple_with_motor_dead_zone_and_friction_take_a_step_throug
             assert!(summary.survives() && summary.final_error_m.abs() < 5e-3, "{name} {law:?}: {summary}");
             // Negative control: a hundredth of the supply cannot recover from a lean from which the full supply does.
             let mut tired = rig.clone();
-            tired.actuator.motor.as_mut().unwrap().supply_v /= 100.0;
+            tired.actuator.motor_mut().unwrap().supply_v /= 100.0;
             let mut push = step.clone();
             push.start[2] = 0.02;
             assert!(run(&rig, &table, &push).survives(), "{name} {law:?}");

@@ -50,7 +50,7 @@ impl Peaks {
     fn shares(self, rig: &Rig) -> [f64; 2] {
         [
             self.angle / (0.5 * rig.limits.angle_rad.unwrap()),
-            self.force / (0.5 * rig.force_limit_n().unwrap()),
+            self.force / (0.5 * rig.actuator.largest_force_n().unwrap()),
         ]
     }
 

@@ -74,7 +74,7 @@ fn a_gain_that_is_wrong_by_a_fifth_or_in_sign_falls() {
 fn no_run_exceeds_the_force_limit() {
     let mut rig = rig("quadruple-paper");
     // A limit below the 9.2 N that the pole placement requests at a step of 1 m.
-    rig.actuator.force_limit_n = Some(5.0);
+    rig.actuator.force_mut().unwrap().limit_n = Some(5.0);
     let table = raw_table(&rig);
     let (trace, summary) = simulate(&rig, &table, &metre_step(&rig, Law::PolePlacement, 2.0)).unwrap();
     assert!(trace.samples().all(|sample| sample.force.abs() <= 5.0));
@@ -87,7 +87,7 @@ fn a_lean_that_the_force_cannot_catch_falls() {
     let mut rig = rig("quadruple-paper");
     let scenario = lean(&rig, Law::Lqr, 0.02);
     assert!(run(&rig, &table(&rig), &scenario).survives());
-    rig.actuator.force_limit_n = Some(0.05);
+    rig.actuator.force_mut().unwrap().limit_n = Some(0.05);
     let weak = run(&rig, &table(&rig), &scenario);
     assert!(matches!(weak.fall.as_ref().map(|fall| fall.kind), Some(FallKind::Link(_))), "{weak}");
 }

@@ -8,7 +8,7 @@ use upright::table::Law;
 use upright_closed_loop::harness::{record, with_firmware};
 use upright_design::numerics::{Matrix, solve};
 use upright_design::plant::{ChainParameters, absolute_angles, linearise};
-use upright_design::rig::{IMPERFECTIONS, Imperfection, PerJoint, Reality, Rig, SECTIONS};
+use upright_design::rig::{Actuator, IMPERFECTIONS, Imperfection, PerJoint, Reality, Rig, SECTIONS};
 use upright_design::simulate::{FallKind, Scenario, run};
 use upright_design::table::TableValues;
 use upright_trust::verify::{ImperfectionSettings, imperfections, required_imperfections};
@@ -119,7 +119,7 @@ fn predicted_swing(rig: &Rig, law: Law, friction: f64) -> f64 {
 /// The single pendulum without motor and encoders: only the law, the tick, and what a test adds have an effect.
 fn bare_single() -> (Rig, TableValues) {
     let (mut rig, _) = load("single-quanser-ip02");
-    rig.actuator.motor = None;
+    rig.actuator = Actuator::Force(*rig.actuator.force().unwrap());
     rig.kalman = None;
     let table = table(&rig);
     (rig, table)
@@ -172,7 +172,7 @@ fn rest_with_wrong_zero(rig: &Rig, error: f64) -> f64 {
 #[test]
 fn a_wrong_zero_moves_the_cart_by_what_the_gains_say() {
     let (mut rig, _) = load("single-quanser-ip02");
-    rig.actuator.motor = None;
+    rig.actuator = Actuator::Force(*rig.actuator.force().unwrap());
     let table = table(&rig);
     let wrong_zero = rest_with_wrong_zero(&rig, 0.005);
     for (zero, amplitude, phase) in [(0.005, 0.0, 0.0), (0.0, 0.0025, core::f64::consts::FRAC_PI_2)] {

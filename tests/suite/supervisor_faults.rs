@@ -133,7 +133,8 @@ fn observe(harness: &mut Harness<'_>, mut injection: Injection, ticks: u32) -> O
 
 fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, ticks: u32) -> Outcome {
     let scenario = at_rest_disturbed(rig, law, seed);
-    let full = if rig.actuator.motor.is_some() { 1.0 } else { rig.force_limit_n().unwrap() as f32 };
+    let full =
+        if rig.actuator.motor().is_some() { 1.0 } else { rig.actuator.largest_force_n().unwrap() as f32 };
     let injection = Injection { defect, from: 1000 + 17 * seed as u32, frozen: None, past: Vec::new(), full };
     balancing(rig, values, &scenario, |harness| observe(harness, injection, ticks)).unwrap()
 }

@@ -245,8 +245,7 @@ pub fn identified(file: &Rig, drawn: &Drawn, number: u64) -> Result<Identified, 
     let settings = Settings { trust_wiring: drawn.trust_wiring, ..Settings::default() };
     let known = |mut log: Log| {
         // The log states the step of the file, which is all that the board knows.
-        if let (DriveScale::Steps(step_m), Some(drive)) = (&mut log.header.drive, &file.actuator.acceleration)
-        {
+        if let (DriveScale::Steps(step_m), Some(drive)) = (&mut log.header.drive, file.actuator.pulses()) {
             *step_m = drive.step_m;
         }
         log

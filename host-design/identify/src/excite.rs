@@ -11,7 +11,7 @@ use upright::supervision::slow_drive::SlowDrive;
 use upright::table::{Law, StepMap};
 use upright_design::plant::ChainParameters;
 use upright_design::reality::hanging_by_hand;
-use upright_design::rig::{Chain, Rig};
+use upright_design::rig::{Actuator, Chain, Motor, Rig};
 use upright_design::simulate::{Bench, Scenario};
 use upright_design::table::{NoTable, step_map};
 
@@ -83,7 +83,7 @@ impl Excitation {
         let chain = chain_of(rig)?;
         let [lowest, highest] = hanging_modes(chain)?;
         let count = LINES[usize::from(chain.links.len() > 1)];
-        let slowest = if rig.actuator.acceleration.is_some() { LOWEST_MOVED } else { BAND[0] };
+        let slowest = if rig.actuator.held().is_motion() { LOWEST_MOVED } else { BAND[0] };
         let (from, to) = (slowest * lowest, BAND[1] * highest);
         let mut random = Pcg64::seed_from_u64(seed);
         let line = |i: usize| {
@@ -130,7 +130,7 @@ impl Excitation {
         let mut p: Vec<f64> = priors(rig, chain, false).iter().map(|prior| prior.value).collect();
         p[Layout { links: chain.links.len() }.delay()] = 0.0;
         let weight = moved_mass(rig, chain) * chain.gravity_m_per_s2;
-        let limit = rig.input_limit().unwrap_or(f64::INFINITY);
+        let limit = rig.actuator.largest_input().unwrap_or(f64::INFINITY);
         let mut largest = weight.min(limit);
         for length_s in [TRIAL_S.min(self.duration_s), self.duration_s] {
             let mut trial = |amplitude_n: f64| {
@@ -162,7 +162,7 @@ impl Excitation {
         let dt_s = rig.tick.period_s * Record::usual_stride(rig.tick.period_s) as f64;
         let (widest, farthest) = (aim_rad(rig), AIM.1 * half_rail(rig.chain()?));
         let fastest = INPUT_SHARE * speed_limit(rig).unwrap_or(f64::INFINITY);
-        let limit_n = rig.input_limit().unwrap_or(f64::INFINITY);
+        let limit_n = rig.actuator.largest_input().unwrap_or(f64::INFINITY);
         let mut state = vec![0.0; model.states()];
         state[1..m].fill(PI);
         let mut step = Step::new(model, false);
@@ -198,16 +198,12 @@ pub(crate) fn half_rail(chain: &Chain) -> f64 {
 
 /// What a unit of the excitation has to move (kg): 1 if the drive imposes the acceleration.
 fn moved_mass(rig: &Rig, chain: &Chain) -> f64 {
-    match rig.actuator.acceleration {
-        Some(_) => 1.0,
-        None => ChainParameters::<f64>::of(chain).total_mass,
-    }
+    if rig.actuator.held().is_motion() { 1.0 } else { ChainParameters::<f64>::of(chain).total_mass }
 }
 
 /// Largest speed of the cart (m/s): that of the file, and of a drive that imposes its motion; none without a limit.
 fn speed_limit(rig: &Rig) -> Option<f64> {
-    let drive = rig.actuator.acceleration.as_ref();
-    let of_drive = drive.and_then(|drive| drive.largest_speed_m_per_s(rig.tick.period_s));
+    let of_drive = rig.actuator.largest_speed_m_per_s(rig.tick.period_s);
     of_drive.into_iter().chain(rig.limits.speed_m_per_s).reduce(f64::min)
 }
 
@@ -274,18 +270,16 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
     let hanging: Vec<u16> = (0..channels)
         .map(|channel| if channel == 1 { libm::round(PI / steps[1]) as i64 as u16 } else { 0 })
         .collect();
-    let full_n = rig.force_limit_n().unwrap_or(10.0 * excitation.amplitude_n * excitation.lines.len() as f64);
-    let mut pulses = Pulses::of(rig)?;
-    let scale = match (&rig.actuator.acceleration, &rig.actuator.motor) {
-        (Some(drive), _) => DriveScale::Steps(drive.step_m),
-        (None, Some(_)) => DriveScale::Duty,
-        (None, None) => DriveScale::Force(full_n),
-    };
+    let full_n = rig
+        .actuator
+        .largest_force_n()
+        .unwrap_or(10.0 * excitation.amplitude_n * excitation.lines.len() as f64);
+    let mut shaking = ShakingDrive::of(rig, full_n)?;
     let mut log = Log::new(LogHeader {
         rig: rig.name.clone(),
         hash: rig.hash(),
         period_ns: (rig.tick.period_s * 1e9).round() as u32,
-        drive: scale,
+        drive: DriveScale::of(rig, full_n),
         hanging,
     });
     let farthest = STOP * half_rail(chain);
@@ -301,59 +295,60 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
         }
         let speed = speed.after(x);
         let force = excitation.force_n(f64::from(number) * period_s, x, speed);
-        let (drive, part) = match &mut pulses {
-            Some(pulses) => pulses.driven(force, period_s),
-            None => driven(rig, scale, force, speed),
-        };
+        let (drive, part) = shaking.command(force, speed, period_s);
         bench.tick(drive);
-        let volts = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v);
+        let volts = rig.actuator.motor().map_or(0.0, |motor| motor.supply_v);
         let supply_mv = (1e3 * volts * bench.supply_share()).round() as u16;
         log.push(Tick { number, drive: part, supply_mv, contacts: 0 }, &counts);
     }
     Ok(Some(log))
 }
 
-/// The drive command for a force at a speed of the cart, and its 16-bit value in the log.
-fn driven(rig: &Rig, scale: DriveScale, force_n: f64, speed: f64) -> (Drive, i16) {
-    let of = |part: f64| (part.clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
-    match (&rig.actuator.motor, scale) {
-        (Some(motor), _) => {
-            let volts = force_n * motor.resistance_before_bridge_ohm() / motor.newtons_per_amp()
-                + motor.volts_per_speed() * speed;
-            // The dead zone is compensated as in the firmware: without a jump.
-            let lift = (10.0 * volts).clamp(-motor.dead_zone_v, motor.dead_zone_v);
-            let part = of((volts + lift) / motor.supply_v);
-            (Drive::Duty((f64::from(part) / f64::from(i16::MAX)) as f32), part)
-        }
-        (None, DriveScale::Force(full_n)) => {
-            let part = of(force_n / full_n);
-            (Drive::Force((f64::from(part) / f64::from(i16::MAX) * full_n) as f32), part)
-        }
-        (None, DriveScale::Duty | DriveScale::Steps(_)) => (Drive::OFF, 0),
-    }
+/// How the host drives the cart that it shakes.
+enum ShakingDrive<'a> {
+    /// By a force, of which this many newtons are full scale.
+    Force(f64),
+    /// By a voltage that gives the force at the speed of the cart.
+    Motor(&'a Motor),
+    /// By pulses, as the firmware gives them.
+    Pulses(StepMap, SlowDrive),
 }
 
-/// The pulses of a drive that imposes the cart's motion, as the firmware gives them.
-struct Pulses {
-    map: StepMap,
-    drive: SlowDrive,
-}
-
-impl Pulses {
-    /// Those of the drive of `rig`, if it has such a one.
-    fn of(rig: &Rig) -> Result<Option<Self>, IdentifyError> {
-        let Some(drive) = &rig.actuator.acceleration else { return Ok(None) };
+impl<'a> ShakingDrive<'a> {
+    fn of(rig: &'a Rig, full_n: f64) -> Result<Self, IdentifyError> {
+        let drive = match &rig.actuator {
+            Actuator::Force(_) => return Ok(Self::Force(full_n)),
+            Actuator::Motor(motor, _) => return Ok(Self::Motor(motor)),
+            Actuator::Pulses(drive) => drive,
+        };
         let failed = |error: NoTable| IdentifyError::Excitation(format!("{}: {error}", rig.name));
         let mut map = step_map(drive, rig.tick.period_s).map_err(failed)?;
         let most = rig.limits.speed_m_per_s.map_or(f32::MAX, |limit| SPEED_SHARE * limit as f32);
         map.speed_limit_m_per_s = map.speed_limit_m_per_s.min(most);
-        Ok(Some(Self { map, drive: SlowDrive::default() }))
+        Ok(Self::Pulses(map, SlowDrive::default()))
     }
 
-    /// The command for an acceleration (m/s²), and its value in the log.
-    fn driven(&mut self, acceleration: f64, period_s: f64) -> (Drive, i16) {
-        let (_, pulses) = self.drive.accelerate(acceleration as f32, &self.map, period_s as f32);
-        (Drive::Steps(pulses), pulses as i16)
+    /// The command for a force (N) or an acceleration (m/s²) at a speed of the cart, and its 16-bit value in the log.
+    fn command(&mut self, input: f64, speed: f64, period_s: f64) -> (Drive, i16) {
+        let of = |part: f64| (part.clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
+        match self {
+            Self::Force(full_n) => {
+                let part = of(input / *full_n);
+                (Drive::Force((f64::from(part) / f64::from(i16::MAX) * *full_n) as f32), part)
+            }
+            Self::Motor(motor) => {
+                let volts = input * motor.resistance_before_bridge_ohm() / motor.newtons_per_amp()
+                    + motor.volts_per_speed() * speed;
+                // The dead zone is compensated as in the firmware: without a jump.
+                let lift = (10.0 * volts).clamp(-motor.dead_zone_v, motor.dead_zone_v);
+                let part = of((volts + lift) / motor.supply_v);
+                (Drive::Duty((f64::from(part) / f64::from(i16::MAX)) as f32), part)
+            }
+            Self::Pulses(map, drive) => {
+                let (_, pulses) = drive.accelerate(input as f32, map, period_s as f32);
+                (Drive::Steps(pulses), pulses as i16)
+            }
+        }
     }
 }
 

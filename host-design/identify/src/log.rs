@@ -27,6 +27,7 @@ use std::path::Path;
 
 use upright::protocol::tick_log::OFF;
 use upright::table::checksum::crc32;
+use upright_design::rig::{Actuator, Rig};
 
 use crate::error::LogError;
 
@@ -46,6 +47,17 @@ pub enum DriveScale {
     Force(f64),
     /// Pulses, each of which moves the cart by so much (m).
     Steps(f64),
+}
+
+impl DriveScale {
+    /// That of a rig; `full_n` is the force at full scale of one without motor data (N).
+    pub fn of(rig: &Rig, full_n: f64) -> Self {
+        match &rig.actuator {
+            Actuator::Force(_) => Self::Force(full_n),
+            Actuator::Motor(..) => Self::Duty,
+            Actuator::Pulses(drive) => Self::Steps(drive.step_m),
+        }
+    }
 }
 
 /// Header of a log: the rig, and how its ticks are to be read.

@@ -101,7 +101,7 @@ impl DrawnMachine {
         rig.reality.sensors.homing_error_rad =
             PerJoint::each((0..links).map(|_| within(HOMING_RAD)).collect());
         rig.reality.sensors.rail_tilt_rad = within(TILT_RAD);
-        if let Some(motor) = &mut rig.actuator.motor {
+        if let Some(motor) = rig.actuator.motor_mut() {
             motor.dead_zone_v *= 1.0 + within(DEAD_ZONE);
         }
         rig.reality.driver.latency_s = 0.5 * (LATENCY_TICKS + within(LATENCY_TICKS)) * rig.tick.period_s;
@@ -112,7 +112,7 @@ impl DrawnMachine {
         draw_air(&mut rig, &usual_drag, &mut random_in);
         draw_sensors(&mut rig, &priors, &mut random_in);
         let mut truth = truth(file, &rig)?;
-        if file.actuator.acceleration.is_some() {
+        if file.actuator.held().is_motion() {
             // Pulses begin in their tick, and are felt by the links alone, as ratios to the last first moment.
             rig.reality.driver = file.reality.driver.clone();
             let of_file = priors[layout.first_moment(links - 1)].value;
@@ -167,7 +167,7 @@ fn draw_air(rig: &mut Rig, usual: &[f64], random: &mut dyn FnMut(f64, f64) -> f6
 /// Draws the travel per count of the cart, and the errors once and twice per turn of sensors that have some.
 fn draw_sensors(rig: &mut Rig, priors: &[Prior], random: &mut dyn FnMut(f64, f64) -> f64) {
     let travel = 1.0 + random(-TRAVEL, TRAVEL);
-    if let Some(drive) = &mut rig.actuator.acceleration {
+    if let Some(drive) = rig.actuator.pulses_mut() {
         drive.step_m *= travel;
     }
     if let Some(chain) = rig.chain_mut() {
@@ -204,7 +204,7 @@ fn truth(file: &Rig, rig: &Rig) -> Result<Vec<(ParameterKind, f64)>, IdentifyErr
         ParameterKind::JointDry(j) => Some(friction.joint_friction_n_m.of_joint(j)),
         ParameterKind::Tilt => Some(sensors.rail_tilt_rad),
         ParameterKind::Delay => Some(rig.reality.driver.latency_s / rig.tick.period_s),
-        ParameterKind::DeadZone => rig.actuator.motor.as_ref().map(|motor| motor.dead_zone_v),
+        ParameterKind::DeadZone => rig.actuator.motor().map(|motor| motor.dead_zone_v),
         ParameterKind::Zero(j) => Some(sensors.homing_error_rad.of_joint(j)),
         ParameterKind::AirDrag(j) => Some(rig.reality.air_drag.air_drag_n_m_s2_per_rad2.of_joint(j)),
         ParameterKind::Travel => Some(rig.sensors()[0].step::<f64>() / file.sensors()[0].step::<f64>()),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use upright_design::number::significant;
-use upright_design::rig::Rig;
+use upright_design::rig::{Actuator, Rig};
 
 use crate::error::IdentifyError;
 use crate::log::{DriveScale, Log};
@@ -44,7 +44,7 @@ pub(crate) fn is_of(rig: &Rig, log: &Log, file: &Path) -> Result<(), IdentifyErr
             "describe the motor in [actuator] as when it was recorded",
         );
     }
-    if let (DriveScale::Steps(step_m), Some(drive)) = (header.drive, &rig.actuator.acceleration)
+    if let (DriveScale::Steps(step_m), Some(drive)) = (header.drive, rig.actuator.pulses())
         && (step_m / drive.step_m - 1.0).abs() > SAME_STEP
     {
         return other(
@@ -77,10 +77,10 @@ impl DriveKind {
     }
 
     fn of_rig(rig: &Rig) -> Self {
-        match (&rig.actuator.acceleration, &rig.actuator.motor) {
-            (Some(_), _) => Self::Pulses,
-            (None, Some(_)) => Self::Duty,
-            (None, None) => Self::Force,
+        match &rig.actuator {
+            Actuator::Force(_) => Self::Force,
+            Actuator::Motor(..) => Self::Duty,
+            Actuator::Pulses(_) => Self::Pulses,
         }
     }
 

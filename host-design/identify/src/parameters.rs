@@ -253,7 +253,7 @@ pub(crate) fn priors(rig: &Rig, chain: &Chain, eccentricity: bool) -> Vec<Prior>
     let gravity = constants.gravity;
     let weight = constants.total_mass * gravity;
     let shape = |value: f64| Prior { value, deviation: SHAPE * value };
-    let motor = rig.actuator.motor.as_ref();
+    let motor = rig.actuator.motor();
     // One percent of critical damping.
     let joint_viscous = |j: usize| 0.02 * (constants.b[(j, j)] * constants.a[j] * gravity).sqrt();
     let viscous =

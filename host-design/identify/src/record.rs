@@ -83,12 +83,12 @@ impl Record {
             channels,
             stride,
             dt_s: stride as f64 * period_s,
-            motor: rig.actuator.motor.clone(),
+            motor: rig.actuator.motor().cloned(),
             stops_within_s: stops_within_s(rig).unwrap_or(f64::INFINITY),
             is_late: rig.tick.delay_ticks == 1,
             shares: shares_of_lag(lag_s(rig), period_s),
             is_clamped: false,
-            is_moved: rig.actuator.acceleration.is_some(),
+            is_moved: rig.actuator.held().is_motion(),
             noise: rig.sensors().iter().map(|sensor| sensor.noise).collect(),
             steps,
         }
@@ -128,7 +128,7 @@ impl Record {
     fn add(&mut self, rig: &Rig, log: &Log) {
         let deviations = log.deviations();
         let ticks = log.ticks();
-        let supply = rig.actuator.motor.as_ref().map_or(0.0, |motor| motor.supply_v);
+        let supply = rig.actuator.motor().map_or(0.0, |motor| motor.supply_v);
         let drive = |index: usize| {
             let tick = &ticks[index];
             let drive = match log.header.drive {
@@ -388,7 +388,7 @@ impl Record {
 
 /// Time constant with which the back-EMF of a rig's motor stops its cart alone (s).
 fn stops_within_s(rig: &Rig) -> Option<f64> {
-    Some(rig.chain()?.cart.mass_kg? / rig.actuator.motor.as_ref()?.braking_n_s_per_m())
+    Some(rig.chain()?.cart.mass_kg? / rig.actuator.motor()?.braking_n_s_per_m())
 }
 
 /// Value and slope at 0 of the parabola through `points` by least squares.

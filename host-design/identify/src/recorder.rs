@@ -1,6 +1,5 @@
 //! Assembles the log of a firmware that sends every tick.
 
-use upright::table::DriveMap;
 use upright_closed_loop::client::AnyTickLog;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -22,11 +21,7 @@ impl Recorder {
     /// A recorder with an empty log, for a rig and its gain table.
     pub fn new(rig: &Rig, table: &TableValues) -> Self {
         let sensors = table.sensors();
-        let drive = match (&rig.actuator.acceleration, &table.drive) {
-            (Some(drive), _) => DriveScale::Steps(drive.step_m),
-            (None, DriveMap::Volts(_)) => DriveScale::Duty,
-            (None, drive) => DriveScale::Force(drive.largest_force_n().into()),
-        };
+        let drive = DriveScale::of(rig, table.drive.largest_force_n().into());
         let log = Log::new(LogHeader {
             rig: rig.name.clone(),
             hash: rig.hash(),

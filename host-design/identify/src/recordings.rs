@@ -185,7 +185,7 @@ fn of_tables(
             }));
         }
         within_reach(period_s, fastest_s).map_err(at_file)?;
-        let is_moved = rig.actuator.acceleration.is_some() && !reading.is_clamped;
+        let is_moved = rig.actuator.held().is_motion() && !reading.is_clamped;
         (is_driven, is_force) = (columns.is_driven() || is_moved, columns.is_force);
         rows.extend(pieces);
     }

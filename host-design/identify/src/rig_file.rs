@@ -77,7 +77,7 @@ fn values(realised: &Realised, rig: &Rig, is_driven: bool) -> Vec<(String, Strin
     if !is_driven {
         each("presliding_rad", |link| link.presliding_rad);
     }
-    if let Some(motor) = &rig.actuator.motor {
+    if let Some(motor) = rig.actuator.motor() {
         values.push(("actuator.dead_zone_v".to_owned(), number(realised.dead_zone_v)));
         let resistance = motor.resistance_ohm * realised.resistance_factor;
         if realised.resistance_factor != 1.0 {
@@ -93,7 +93,7 @@ fn sensors(rig: &Rig, found: &Identification) -> Vec<(String, String)> {
     let number = |value: f64| rounded(value, 6).to_string();
     let mut values = Vec::new();
     let of = |kind: ParameterKind| found.estimate(kind).map(|estimate| estimate.new);
-    let drive = rig.actuator.acceleration.as_ref().map(|drive| ("actuator.step_m", drive.step_m));
+    let drive = rig.actuator.pulses().map(|drive| ("actuator.step_m", drive.step_m));
     let cart = rig.chain().and_then(|chain| Some(("cart.encoder_step_m", chain.cart.encoder_step_m?)));
     if let (true, Some((key, step_m)), Some(travel)) =
         (found.is_log, drive.or(cart), of(ParameterKind::Travel))

@@ -27,7 +27,7 @@ pub(crate) fn as_written(
     let start: Vec<f64> = priors(&new, chain, false).iter().map(|prior| prior.value).collect();
     let mut written = old_values(&new, layout, &start, p);
     let last = layout.first_moment(layout.links - 1);
-    let scale = match (&new.actuator.motor, &rig.actuator.motor) {
+    let scale = match (new.actuator.motor(), rig.actuator.motor()) {
         _ if found.is_moved || !found.is_driven => p[last] / written[last],
         (Some(new), Some(old)) => new.resistance_ohm / old.resistance_ohm,
         _ => 1.0,
@@ -38,7 +38,7 @@ pub(crate) fn as_written(
         }
     }
     let step = |chain: &Chain, rig: &Rig| {
-        rig.actuator.acceleration.as_ref().map(|drive| drive.step_m).or(chain.cart.encoder_step_m)
+        rig.actuator.pulses().map(|drive| drive.step_m).or(chain.cart.encoder_step_m)
     };
     // A table in metres has a scale of its own.
     written[layout.travel()] = match (found.is_log, step(chain, &new), step(old, rig)) {

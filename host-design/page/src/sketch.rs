@@ -62,9 +62,9 @@ fn fields(rig: &Rig) -> Vec<Value> {
         field("cart.encoder_step_m", "sensor of the cart", "m/count", chain.cart.encoder_step_m);
     }
     let actuator = &rig.actuator;
-    field("actuator.force_limit_n", "force limit", "N", actuator.force_limit_n);
-    field("actuator.supply_v", "supply", "V", actuator.motor.as_ref().map(|motor| motor.supply_v));
-    if let Some(drive) = &actuator.acceleration {
+    field("actuator.force_limit_n", "force limit", "N", actuator.force().and_then(|force| force.limit_n));
+    field("actuator.supply_v", "supply", "V", actuator.motor().map(|motor| motor.supply_v));
+    if let Some(drive) = actuator.pulses() {
         let limit = Some(drive.acceleration_limit_m_per_s2);
         field("actuator.step_m", "travel per pulse", "m", Some(drive.step_m));
         field("actuator.acceleration_limit_m_per_s2", "acceleration limit", "m/s²", limit);

@@ -14,7 +14,7 @@ use super::{PaperRigs, ReproduceError, SEED, published};
 use upright_design::design::{Certified, DesignError, Feedback, design};
 use upright_design::parallel;
 use upright_design::plant::reference::Tolerance;
-use upright_design::rig::{PolePlacement, Rig, Tick};
+use upright_design::rig::{Actuator, ForceDrive, PolePlacement, Rig, Tick};
 use upright_design::simulate::{Fall, Scenario, Sensing};
 use upright_design::table::{Gains, TableValues};
 
@@ -262,7 +262,8 @@ impl Change {
             Change::Firmware { tick, gains, force_limit_n } => {
                 let run = |&time_s| {
                     let mut rig = Rig { tick: tick.clone(), ..asking_for(&rigs.exact, time_s) };
-                    rig.actuator.force_limit_n = *force_limit_n;
+                    let force = ForceDrive { limit_n: *force_limit_n, lag_s: None };
+                    rig.actuator = Actuator::Force(force);
                     if let Some(chain) = rig.chain_mut() {
                         chain.cart.travel_m = [-1e3, 1e3]; // the paper has no rail
                     }

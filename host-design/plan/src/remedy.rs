@@ -81,7 +81,7 @@ impl Remedy {
     /// Allows `factor` times as much force or acceleration in a plan: raises what `[swing_up]` allows, and strengthens
     /// the actuator if it is too weak for that.
     fn strengthen(&mut self, factor: f64) -> Option<()> {
-        let full = self.rig.input_limit()?;
+        let full = self.rig.actuator.largest_input()?;
         let rules = self.rig.swing_up.get_or_insert_default();
         let wanted = rounded(factor * rules.input().map_or(full, |input| input.min(full)), DIGITS);
         let planned =
@@ -94,15 +94,15 @@ impl Remedy {
         }
         if wanted > full {
             let actuator = &mut self.rig.actuator;
-            if let Some(drive) = &mut actuator.acceleration {
+            if let Some(drive) = actuator.pulses_mut() {
                 drive.acceleration_limit_m_per_s2 = wanted;
                 self.keys.push(format!("actuator.acceleration_limit_m_per_s2 = {wanted}"));
             }
-            if let Some(limit) = &mut actuator.force_limit_n {
+            if let Some(limit) = actuator.force_mut().and_then(|force| force.limit_n.as_mut()) {
                 *limit = rounded(*limit * wanted / full, DIGITS);
                 self.keys.push(format!("actuator.force_limit_n = {limit}"));
             }
-            if let Some(motor) = &mut actuator.motor {
+            if let Some(motor) = actuator.motor_mut() {
                 motor.supply_v = rounded(motor.supply_v * wanted / full, DIGITS);
                 self.keys.push(format!("actuator.supply_v = {}", motor.supply_v));
             }
@@ -116,7 +116,7 @@ impl Remedy {
         let speed = of_plan.or(self.rig.limits.speed_m_per_s.as_mut())?;
         *speed = rounded(factor * *speed, DIGITS);
         self.keys.push(format!("{section}.speed_m_per_s = {speed}"));
-        let drive = self.rig.actuator.acceleration.as_mut();
+        let drive = self.rig.actuator.pulses_mut();
         let limits = drive.into_iter().flat_map(|drive| {
             [
                 ("speed_limit_m_per_s", &mut drive.speed_limit_m_per_s),

@@ -86,8 +86,8 @@ impl<'a> Setting<'a> {
         let (Some(lqr), Some(kalman)) = (&rig.lqr, &rig.kalman) else {
             return Err(SwingUpError::Needs("[lqr] and [kalman]"));
         };
-        let input =
-            rig.input_limit().ok_or(SwingUpError::Needs("force_limit_n in [actuator], or a motor"))?;
+        let input = rig.actuator.largest_input();
+        let input = input.ok_or(SwingUpError::Needs("force_limit_n in [actuator], or a motor"))?;
         if rig.tick.delay_ticks != 0 {
             return Err(SwingUpError::Delay);
         }
@@ -96,7 +96,7 @@ impl<'a> Setting<'a> {
             return Err(SwingUpError::Needs("an encoder at every link"));
         }
         let (dynamics, tick_s) = (dynamics(chain)?, rig.tick.period_s);
-        let drive = rig.actuator.acceleration.as_ref();
+        let drive = rig.actuator.pulses();
         let steps: Vec<f64> = sensors.iter().map(|sensor| sensor.step()).collect();
         let rules = rig.swing_up.clone().unwrap_or_default();
         can_be_judged(rules.success_percent)?;
@@ -123,8 +123,8 @@ impl<'a> Setting<'a> {
             actuator: Bounds {
                 kind: chain.input,
                 input,
-                motor: rig.actuator.motor.as_ref().map(motor),
-                speed_m_per_s: drive.and_then(|drive| drive.largest_speed_m_per_s(tick_s)),
+                motor: rig.actuator.motor().map(motor),
+                speed_m_per_s: rig.actuator.largest_speed_m_per_s(tick_s),
                 lead_s: drive.filter(|drive| drive.lag_s() > 0.0).map_or(0.0, |drive| drive.lead_s(tick_s)),
                 rail_m: Some(chain.cart.travel_m),
             },

@@ -129,7 +129,7 @@ fn variants() -> [(&'static str, Rig); 7] {
         fed_forward_percent: 30.0,
     });
     let mut late = single.clone();
-    late.actuator.driver_lag_s = Some(0.004);
+    late.actuator.force_mut().unwrap().lag_s = Some(0.004);
     let mut late_and_delayed = late.clone();
     late_and_delayed.tick.delay_ticks = 1;
     let late_and_integral = Rig { integral: integral.clone(), ..late.clone() };
@@ -209,7 +209,7 @@ fn a_set_point_is_accepted_up_to_where_the_firmware_accepts_it() {
     for name in ["single-quanser-ip02", "quadruple-paper", "single-stepper"] {
         let (rig, table) = rig_and_table(name);
         let still = scenario(rig, Law::Lqr, 1000);
-        let run = match rig.actuator.acceleration {
+        let run = match rig.actuator.pulses() {
             Some(_) => steps::recorded_steps(rig, table, &still, steps::nothing),
             None => recorded(rig, table, &still, None),
         };

@@ -161,7 +161,7 @@ fn pulses_have_the_bits_of_the_firmware_with_one_two_and_four_links_and_with_a_s
         return;
     }
     let mut slow = rig_and_table("double-stepper").0.clone();
-    slow.actuator.acceleration.as_mut().unwrap().bandwidth_hz = Some(20.0);
+    slow.actuator.pulses_mut().unwrap().bandwidth_hz = Some(20.0);
     let slow = (slow.clone(), table(&slow));
     let ideal = ["single-stepper", "double-stepper", "quadruple-stepper"].map(rig_and_table);
     for (rig, table) in ideal.into_iter().chain([&slow]) {

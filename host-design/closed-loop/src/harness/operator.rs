@@ -88,7 +88,7 @@ impl Operator {
                 Begin::Hanging => Request::Goto(Equilibrium::UPRIGHT),
             },
             rig: HeldRig::hanging(rig),
-            pulse_m: rig.actuator.acceleration.as_ref().map(|drive| drive.step_m),
+            pulse_m: rig.actuator.pulses().map(|drive| drive.step_m),
             start: scenario.start.clone(),
             pushed: Bench::new(rig, &undisturbed)?,
             retry_ticks: ticks(RETRY_S),

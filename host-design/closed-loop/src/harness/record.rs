@@ -150,7 +150,7 @@ impl RunRecord {
             pending: VecDeque::new(),
             next_tick: None,
             telemetry_ticks,
-            takes_pulses: rig.actuator.acceleration.is_some(),
+            takes_pulses: rig.actuator.held().is_motion(),
             fall: None,
             fault: None,
             worst_cycles: 0,

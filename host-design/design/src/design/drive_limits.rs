@@ -35,7 +35,7 @@ impl DriveLimits {
     /// The limits of `design` for `rig`; none with another kind of drive, without LQR or observer, or where the drive
     /// that was designed for is not stable: the fastest one, or that with the file's bandwidth.
     pub fn of(rig: &Rig, design: &Design<f64>) -> Option<Self> {
-        let drive = rig.actuator.acceleration.as_ref()?;
+        let drive = rig.actuator.pulses()?;
         let of = |follower: Follower| is_stable(rig, design, follower).unwrap_or(false);
         let servo = |rate: f64| of(Follower::Spring([0.0, rate]));
         let damping = 0.01 * rig.reality.step_motor.motor_damping_percent;
@@ -131,7 +131,7 @@ fn is_stable(rig: &Rig, design: &Design<f64>, follower: Follower) -> Option<bool
     // Rows of x̂ and of the command's speed, from the real state and x̂⁻.
     let corrected = &kalman.l_filter * &rig.measurement();
     let estimate = corrected.beside(&Matrix::zeros(s, 1)).beside(&(&Matrix::identity(s) - &corrected));
-    let drive = rig.actuator.acceleration.as_ref()?;
+    let drive = rig.actuator.pulses()?;
     let mut speed = law.k.scaled(&-drive.lead_s(period_s));
     speed[(0, 1)] += 1.0;
     let speed = &speed * &estimate;

@@ -81,9 +81,8 @@ fn bound(rig: &Rig, sums: &[f64], beyond: &Beyond) -> Option<f64> {
     let (force, angles) = sums.split_last()?;
     let angle_limit = rig.limits.angle_rad.unwrap_or(defaults::ANGLE_RAD).min(defaults::ANGLE_RAD);
     let by_angle = angles.iter().map(|sum| SHARE * angle_limit / sum);
-    let by_force = rig.input_limit().map(|limit| SHARE * limit / force);
-    let drive = rig.actuator.acceleration.as_ref();
-    let most = drive.and_then(|drive| drive.largest_speed_m_per_s(rig.tick.period_s));
+    let by_force = rig.actuator.largest_input().map(|limit| SHARE * limit / force);
+    let most = rig.actuator.largest_speed_m_per_s(rig.tick.period_s);
     let by_speed = most.map(|limit| SHARE * limit / speed);
     let by_rail = rig.chain().map(|chain| {
         let [low, high] = rig.soft_rail_m(chain);

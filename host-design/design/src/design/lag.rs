@@ -6,7 +6,7 @@ use crate::rig::Rig;
 
 /// The time constant (s) that the rig file states; 0 for a force that follows at once.
 pub fn lag_s(rig: &Rig) -> f64 {
-    rig.actuator.driver_lag_s.unwrap_or(0.0)
+    rig.actuator.lag_s().unwrap_or(0.0)
 }
 
 /// Whether the force is a tick late, without a lag: then the laws feed back the whole pending force.
@@ -128,7 +128,7 @@ mod tests {
         rig.tick.delay_ticks = 1;
         let mut worst = [0.0f64; 2];
         for lag_s in [1e-4, 1e-3, 2e-3, 0.01] {
-            rig.actuator.driver_lag_s = Some(lag_s);
+            rig.actuator.force_mut().unwrap().lag_s = Some(lag_s);
             for phi in [0.02, 0.05, 0.1, 0.2] {
                 let exact = Complex::from_polar(1.0, -phi) * response(shares_of_lag(lag_s, 1e-3), phi);
                 let off = |shares| (response(shares, phi) - exact).norm();

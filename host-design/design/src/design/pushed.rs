@@ -33,7 +33,7 @@ pub(super) fn pushed(
     kalman: &Kalman<f64>,
     healthy: f64,
 ) -> Option<Vec<f64>> {
-    let (chain, limit) = (rig.chain()?, rig.input_limit()?);
+    let (chain, limit) = (rig.chain()?, rig.actuator.largest_input()?);
     if !rig.actuator.input().is_force() {
         return None;
     }

@@ -377,7 +377,7 @@ fn lqr_cost<R: Real>(weights: &Lqr) -> Cost<R> {
 /// The continuous-time poles of the loop (1/s): those that the rig file asks for, and a force with a lag keeps its own.
 fn all_poles<R: Real>(placement: &PolePlacement, rig: &Rig) -> Result<Vec<Pole<R>>, DesignError> {
     let mut poles = wanted_poles(placement, rig)?;
-    if let Some(lag_s) = rig.actuator.driver_lag_s {
+    if let Some(lag_s) = rig.actuator.lag_s() {
         poles.push(Pole::Real(R::zero() - &(R::one() / &R::from_f64(lag_s))));
     }
     Ok(poles)

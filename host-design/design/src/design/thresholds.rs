@@ -4,7 +4,7 @@ use super::Design;
 use super::kalman::sensor_variances;
 use super::pushed::pushed;
 use super::tolerated::Tolerated;
-use crate::rig::Rig;
+use crate::rig::{Held, Rig};
 
 /// Share of the motor's force that may be missing.
 const MISSING_SHARE: f64 = 0.5;
@@ -86,7 +86,7 @@ pub fn detection_thresholds(rig: &Rig, design: &Design<f64>) -> Option<Detection
         // The prediction moves by up to a step between two pulses; the rest is for its rounding.
         frozen[0] *= 1.5;
         // While the command of a drive with lag stands still, its cart may move.
-        if rig.actuator.acceleration.as_ref().is_some_and(|drive| drive.bandwidth_hz.is_some()) {
+        if matches!(rig.actuator.held(), Held::LaggingSpeed { .. }) {
             frozen[0] = f64::INFINITY;
         }
     }

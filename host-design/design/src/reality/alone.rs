@@ -16,8 +16,7 @@ impl Imperfection {
             reality.friction.presliding_rad = PerJoint::all(bristle_rad);
         }
         self.set(&mut reality, size);
-        if let (Some(real_s), Some(stated_s)) = (&mut reality.driver.driver_lag_s, rig.actuator.driver_lag_s)
-        {
+        if let (Some(real_s), Some(stated_s)) = (&mut reality.driver.driver_lag_s, rig.actuator.lag_s()) {
             *real_s += stated_s;
         }
         Rig { reality, ..rig.clone() }

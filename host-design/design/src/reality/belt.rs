@@ -54,7 +54,7 @@ impl Belt {
         let stiffness = if belt_compliance_m_per_n > 0.0 {
             1.0 / belt_compliance_m_per_n
         } else {
-            rig.force_limit_n().unwrap_or(FORCE_N) / (TEETH_SHARE * backlash_m)
+            rig.actuator.largest_force_n().unwrap_or(FORCE_N) / (TEETH_SHARE * backlash_m)
         };
         let damping = 2.0 * DAMPING_RATIO * (stiffness * rotor_kg).sqrt();
         Some(Self { rotor_kg, half_play: 0.5 * backlash_m, stiffness, damping })

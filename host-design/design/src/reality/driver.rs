@@ -33,8 +33,8 @@ impl Driver {
     pub fn of(rig: &Rig) -> Option<Self> {
         let &DriverErrors { driver_lag_s, current_limit_a, supply_resistance_ohm, force_percent, .. } =
             &rig.reality.driver;
-        let lag_s = driver_lag_s.or(rig.actuator.driver_lag_s).unwrap_or(0.0);
-        let motor = rig.actuator.motor.as_ref().map(MotorPlant::of);
+        let lag_s = driver_lag_s.or(rig.actuator.lag_s()).unwrap_or(0.0);
+        let motor = rig.actuator.motor().map(MotorPlant::of);
         let is_ideal = motor.is_none() && lag_s == 0.0 && force_percent == 0.0;
         (!is_ideal).then(|| Self {
             motor,

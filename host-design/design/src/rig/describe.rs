@@ -22,7 +22,7 @@ use super::sections::tick::TICK;
 use super::sections::verify::VERIFY;
 use super::value::Keys;
 use super::{
-    Actuator, Chain, KalmanNoise, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription,
+    Actuator, Chain, ForceDrive, KalmanNoise, LinearPlant, Link, LinkEncoder, Lqr, Motor, PlantDescription,
     PolePlacement, Reality, Rig,
 };
 
@@ -32,7 +32,7 @@ impl Rig {
     /// The rig's values as plain text, narrower than 80 columns. Values that equal their default or were left out are
     /// marked `(default)`.
     pub fn describe(&self) -> String {
-        let is_acceleration = self.actuator.acceleration.is_some();
+        let is_acceleration = self.actuator.held().is_motion();
         let mut page = Description { is_acceleration, ..Description::default() };
         page.heading(&self.name);
         page.note("hash", &format!("{:016x}", self.hash()));
@@ -254,17 +254,24 @@ impl Description {
 
     fn actuator(&mut self, actuator: &Actuator) {
         self.heading("actuator");
-        if let Some(drive) = &actuator.acceleration {
-            self.note("kind", "acceleration");
-            self.rows(&ACTUATOR, drive);
-            return;
+        match actuator {
+            Actuator::Force(force) => {
+                self.force_limit(force);
+                self.note("motor", "none");
+            }
+            Actuator::Motor(motor, force) => {
+                self.force_limit(force);
+                self.motor(motor);
+            }
+            Actuator::Pulses(drive) => {
+                self.note("kind", "acceleration");
+                self.rows(&ACTUATOR, drive);
+            }
         }
-        let limit = ACTUATOR.key("force_limit_n");
-        self.row(&ACTUATOR, limit, actuator.force_limit_n.as_slice());
-        match &actuator.motor {
-            None => self.note("motor", "none"),
-            Some(motor) => self.motor(motor),
-        }
+    }
+
+    fn force_limit(&mut self, force: &ForceDrive) {
+        self.row(&ACTUATOR, ACTUATOR.key("force_limit_n"), force.limit_n.as_slice());
     }
 
     fn motor(&mut self, motor: &Motor) {

@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use upright::table::Law;
 
 use super::defaults;
-use super::sections::actuator::{Actuator, Motor};
+use super::sections::actuator::Actuator;
 use super::sections::chain::{Chain, PlantDescription};
 use super::sections::friction::KnownFriction;
 use super::sections::integral::Integral;
@@ -26,7 +26,7 @@ pub struct Rig {
     pub name: String,
     /// The plant: a chain of links on a cart, or a linear model.
     pub plant: PlantDescription,
-    /// Force limit and motor.
+    /// The drive of the cart.
     pub actuator: Actuator,
     /// Control period and delay.
     pub tick: Tick,
@@ -108,22 +108,6 @@ impl Rig {
     /// Number of links; 0 if the plant is a linear model.
     pub fn links(&self) -> usize {
         self.chain().map_or(0, |chain| chain.links.len())
-    }
-
-    /// Largest force on the cart (N): the smaller of the file's limit and the motor's stall force, where given.
-    /// None: no limit, or a drive that imposes the acceleration, whatever force that takes.
-    pub fn force_limit_n(&self) -> Option<f64> {
-        let stall = self.actuator.motor.as_ref().map(Motor::stall_force_n);
-        match (self.actuator.force_limit_n, stall) {
-            (Some(limit), Some(stall)) => Some(limit.min(stall)),
-            (limit, stall) => limit.or(stall),
-        }
-    }
-
-    /// Largest input of the plant: force on the cart (N), or its acceleration (m/s²). None: no limit.
-    pub fn input_limit(&self) -> Option<f64> {
-        let drive = self.actuator.acceleration.as_ref();
-        drive.map(|drive| drive.acceleration_limit_m_per_s2).or_else(|| self.force_limit_n())
     }
 
     /// Index of the state that follows the set-point: the cart position, or the model's output.

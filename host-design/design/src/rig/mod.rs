@@ -45,7 +45,7 @@ pub use held::Held;
 pub(crate) use held::lag_at;
 pub use key::{Absent, Key, Section, unit_in_names};
 pub use rule::Rule;
-pub use sections::actuator::{AccelerationDrive, Actuator, Motor};
+pub use sections::actuator::{AccelerationDrive, Actuator, ForceDrive, Motor};
 pub use sections::chain::{Cart, CartInput, Chain, MAX_LINKS, PlantDescription};
 pub use sections::friction::KnownFriction;
 pub use sections::imperfections::{Allowance, IMPERFECTIONS, Imperfection, LargestSize, Slider};

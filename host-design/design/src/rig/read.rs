@@ -24,7 +24,7 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let input = actuator.input();
     let plant = chain::plant(&root, input)?;
     let states = plant.states();
-    let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor.is_some());
+    let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor().is_some());
     let reality = given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?;
     let (verify, must_survive) = given(&verify::VERIFY)
         .map_or(Ok(Default::default()), |node| verify::verify(&node, &actuator, &reality))?;

@@ -164,7 +164,7 @@ impl Rig {
         match &self.plant {
             PlantDescription::Chain(chain) => {
                 // A drive that imposes the motion counts its own steps.
-                let step_m = self.actuator.acceleration.as_ref().map(|drive| drive.step_m);
+                let step_m = self.actuator.pulses().map(|drive| drive.step_m);
                 let cart =
                     step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_cart(&chain.cart, step));
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {

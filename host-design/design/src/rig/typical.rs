@@ -40,7 +40,7 @@ impl Rig {
     /// A drive that imposes the cart's acceleration overcomes its friction.
     pub fn detection_tolerances(&self) -> Option<Tolerances> {
         let mut typical = Tolerances::typical(self.chain()?);
-        if self.actuator.acceleration.is_some() {
+        if self.actuator.held().is_motion() {
             typical.cart_friction_n = 0.0;
         }
         Some(self.robust.as_ref().map_or_else(|| typical.clone(), |stated| stated.at_least(&typical)))

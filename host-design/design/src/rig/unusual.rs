@@ -116,12 +116,12 @@ impl Rig {
                 .into_iter()
                 .for_each(|value| found.expect(&ACTUATOR, &format!("actuator.{name}"), name, value));
         };
-        of_actuator("force_limit_n", actuator.force_limit_n);
-        of_actuator("driver_lag_s", actuator.driver_lag_s);
-        if let Some(drive) = &actuator.acceleration {
+        of_actuator("force_limit_n", actuator.force().and_then(|force| force.limit_n));
+        of_actuator("driver_lag_s", actuator.lag_s());
+        if let Some(drive) = actuator.pulses() {
             found.expect_all(&ACTUATOR, drive);
         }
-        if let Some(motor) = &actuator.motor {
+        if let Some(motor) = actuator.motor() {
             found.expect_all(&ACTUATOR, motor);
             found.expect_free_speed(motor.supply_v / motor.volts_per_speed());
         }
@@ -133,7 +133,7 @@ impl Rig {
     /// Whether the rail is shorter than one turn of the motor's pulley, as the arc of an arm is that turns about a
     /// vertical axis and is described as a cart. A belt or a rack is longer than that.
     pub fn may_be_an_arm(&self) -> bool {
-        let pulley = self.actuator.motor.as_ref().map(|motor| motor.pulley_radius_m);
+        let pulley = self.actuator.motor().map(|motor| motor.pulley_radius_m);
         pulley.zip(self.chain()).is_some_and(|(radius_m, chain)| {
             let [low, high] = chain.cart.travel_m;
             high - low < TAU * radius_m

@@ -282,7 +282,7 @@ impl Bench {
 
 /// Checks that a motor's speed can be followed within a tick.
 fn can_be_followed(rig: &Rig, plant: &dyn Plant) -> Result<(), SimulationError> {
-    let Some(motor) = &rig.actuator.motor else { return Ok(()) };
+    let Some(motor) = rig.actuator.motor() else { return Ok(()) };
     let (period_s, damping) = (rig.tick.period_s, motor.braking_n_s_per_m());
     let steps = plant.steps(damping, period_s, 1);
     if steps <= MOST_STEPS {

@@ -107,7 +107,7 @@ impl<'a> ClosedLoopRun<'a> {
         sensors: usize,
         scenario: &'a Scenario,
     ) -> Result<Self, SimulationError> {
-        if rig.actuator.acceleration.is_some() && scenario.sensing == Sensing::FullState {
+        if rig.actuator.held().is_motion() && scenario.sensing == Sensing::FullState {
             return Err(match rig.kalman {
                 Some(_) => SimulationError::FullState,
                 None => SimulationError::NoObserver,

@@ -6,7 +6,7 @@ use super::driven_cart::DrivenCart;
 use super::sensor::nearest;
 use super::servo::Servo;
 use crate::reality::{Driver, StepMotor};
-use crate::rig::Rig;
+use crate::rig::{Actuator, Rig};
 
 /// What is wrong with a drive that takes pulses. The board counts its pulses whatever it does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,10 +32,9 @@ pub(super) enum SimulatedDrive {
 impl SimulatedDrive {
     /// The drive of the machine of `rig`, which starts at `start`.
     pub(super) fn of(rig: &Rig, start: &[f64]) -> Self {
-        match (&rig.actuator.acceleration, Driver::of(rig)) {
-            (Some(drive), _) => Self::Pulses(PulseDrive::of(rig, drive.step_m, start)),
-            (None, Some(driver)) => Self::Driver(driver),
-            (None, None) => Self::Force,
+        match &rig.actuator {
+            Actuator::Pulses(drive) => Self::Pulses(PulseDrive::of(rig, drive.step_m, start)),
+            Actuator::Force(_) | Actuator::Motor(..) => Driver::of(rig).map_or(Self::Force, Self::Driver),
         }
     }
 
@@ -156,7 +155,11 @@ impl PulseDrive {
         let defect = self.defect.take();
         let missed = match defect {
             None => 0.0,
-            Some(StepDefect::Off | StepDefect::Jammed) if matches!(self.follower, PulseFollower::Motor(_)) => 0.0,
+            Some(StepDefect::Off | StepDefect::Jammed)
+                if matches!(self.follower, PulseFollower::Motor(_)) =>
+            {
+                0.0
+            }
             Some(StepDefect::Off | StepDefect::Jammed) => f64::from(pulses),
             Some(StepDefect::Misses(share)) => (share * f64::from(pulses)).round(),
         };

@@ -159,7 +159,7 @@ impl Summary {
         let settling_time_s = settled
             .then(|| last_outside.map_or(0.0, |t| (t + rig.tick.period_s - scenario.step_at_s).max(0.0)));
         let percent = |excursion: f64| (step != 0.0).then(|| 100.0 * excursion / step.abs());
-        let motor = rig.actuator.motor.as_ref().filter(|_| fall.is_some());
+        let motor = rig.actuator.motor().filter(|_| fall.is_some());
         let reach = motor.map(|motor| (motor.supply_v - motor.dead_zone_v) / motor.volts_per_speed());
         Self {
             fall,

@@ -59,7 +59,7 @@ fn set_limits_of_chain(
     let slow = |rate: f64, step: f64| counts(rate * wanted.arm_time_s, step).max(1);
     limits.slow_counts[0] = slow(wanted.arm_speed_m_per_s, cart);
     // The count of a drive with pulses has the sign of the pulses.
-    let has_encoder = rig.actuator.acceleration.is_none();
+    let has_encoder = !rig.actuator.held().is_motion();
     limits.sign_counts[0] = if has_encoder { counts(SIGN_SHARE * length, cart).max(1) } else { 0 };
     for (joint, &step) in joints.iter().enumerate() {
         let sensor = joint + 1;
@@ -109,13 +109,13 @@ pub(super) fn thresholds(design: Option<&DetectionDesign>) -> Thresholds<MAX_SEN
 /// Largest force of the jog (N), or its like for a drive that imposes the acceleration (m/s²); without a limit, only
 /// what the rig file gives.
 fn jog_force_n(rig: &Rig) -> Option<f64> {
-    let (wanted, limit) = (rig.limits.jog_force_n, rig.input_limit());
+    let (wanted, limit) = (rig.limits.jog_force_n, rig.actuator.largest_input());
     let derived = limit.map(|limit| defaults::JOG_FORCE_SHARE * limit);
     wanted.or(derived).map(|force| force.min(limit.unwrap_or(f64::INFINITY)))
 }
 
 fn supply_min_v(rig: &Rig) -> Option<f64> {
-    let motor = rig.actuator.motor.as_ref();
+    let motor = rig.actuator.motor();
     rig.limits.supply_min_v.or(motor.map(|motor| defaults::SUPPLY_SHARE * motor.supply_v))
 }
 

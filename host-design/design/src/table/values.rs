@@ -16,7 +16,7 @@ use super::{contents, friction, supervision};
 use crate::design::{
     Certified, Design, Feedback, Kalman, Uncertified, detection_thresholds, setpoint_step, shares,
 };
-use crate::rig::{AccelerationDrive, Motor, PlantDescription, Rig};
+use crate::rig::{AccelerationDrive, Actuator, Motor, PlantDescription, Rig};
 
 /// Which gains go into a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -297,16 +297,15 @@ fn law_gains(law: &Feedback<f32>, states: usize, setpoint_step: Option<f64>) -> 
 }
 
 fn drive_map(rig: &Rig) -> Result<DriveMap, NoTable> {
-    let (actuator, period_s) = (&rig.actuator, rig.tick.period_s);
-    if let Some(drive) = &actuator.acceleration {
-        return Ok(DriveMap::Pulses(step_map(drive, period_s)?));
-    }
+    let period_s = rig.tick.period_s;
     let [acts, stays] = shares(rig, period_s).map(|share| share as f32);
-    let limit_n = rig.force_limit_n().map_or(Ok(f32::MAX), |n| finite("actuator.force_limit_n", n as f32))?;
+    let limit_n = rig.actuator.largest_force_n();
+    let limit_n = limit_n.map_or(Ok(f32::MAX), |n| finite("actuator.force_limit_n", n as f32))?;
     let force = ForceMap { limit_n, late: Late { acts, stays } };
-    Ok(match &actuator.motor {
-        Some(motor) => DriveMap::Volts(motor_map(motor, force, period_s)?),
-        None => DriveMap::Force(force),
+    Ok(match &rig.actuator {
+        Actuator::Force(_) => DriveMap::Force(force),
+        Actuator::Motor(motor, _) => DriveMap::Volts(motor_map(motor, force, period_s)?),
+        Actuator::Pulses(drive) => DriveMap::Pulses(step_map(drive, period_s)?),
     })
 }
 

@@ -41,7 +41,7 @@ fn simulated(rig: &Rig, ticks: usize) -> Vec<[f64; 2]> {
 /// late.
 fn exact(rig: &Rig, ticks: usize, lag_s: f64) -> Vec<[f64; 2]> {
     let chain = rig.chain().unwrap();
-    let motor = rig.actuator.motor.as_ref().unwrap();
+    let motor = rig.actuator.motor().unwrap();
     let (mass, friction) = (chain.cart.mass_kg.unwrap(), chain.cart.friction_n_s_per_m);
     let length_s = ticks as f64 * rig.tick.period_s;
     let ([mut x, mut v], mut late) = ([0.0; 2], 0.0);
@@ -88,7 +88,7 @@ fn apart(found: &[[f64; 2]], wanted: &[[f64; 2]]) -> f64 {
 /// As [`simulated`], with the force of the motor held for a quarter of a tick.
 fn held(rig: &Rig, ticks: usize) -> Vec<[f64; 2]> {
     let mut plant = chain_plant(rig.chain().unwrap()).unwrap();
-    let motor = MotorPlant::of(rig.actuator.motor.as_ref().unwrap());
+    let motor = MotorPlant::of(rig.actuator.motor().unwrap());
     let mut state = vec![0.0; 4];
     plant.set_state(&state);
     let after = |command: &Option<f32>| {
@@ -121,7 +121,7 @@ fn motor_and_cart_move_as_their_closed_form_says() {
 fn a_winding_delays_the_force_as_its_closed_form_says() {
     for lag_s in [2e-5, 5e-4, 3e-3, 0.05] {
         let mut rig = cart_alone(6.3);
-        rig.actuator.motor.as_mut().unwrap().dead_zone_v = 0.0;
+        rig.actuator.motor_mut().unwrap().dead_zone_v = 0.0;
         rig.reality.driver.driver_lag_s = Some(lag_s);
         let found = apart(&simulated(&rig, 3), &exact(&rig, 3, lag_s));
         assert!(found < 1e-6, "{lag_s} s: {found:.1e}");
@@ -158,7 +158,7 @@ fn change(rig: &Rig, [steps, more]: [usize; 2], duration_s: f64) -> f64 {
 /// The same for a drive that takes pulses, as the sum of what changes in each tick of the same second. The loop does
 /// not act on a difference below a pulse: between two runs, even one of rounding would grow as links fall.
 fn change_in_all_ticks(rig: &Rig, [steps, more]: [usize; 2]) -> f64 {
-    let step_m = rig.actuator.acceleration.as_ref().unwrap().step_m;
+    let step_m = rig.actuator.pulses().unwrap().step_m;
     let scenario = Scenario { duration_s: 1.0, ..Scenario::acceptance(rig, Law::Lqr, 0.1) };
     let (trace, summary) = simulate(rig, &table(rig), &scenario).unwrap();
     assert!(summary.survives(), "{}: {summary}", rig.name);
@@ -186,7 +186,7 @@ fn no_number_of_integration_steps_decides_how_a_rig_balances() {
     let names =
         rigs.filter_map(|file| Some(file.unwrap().file_name().to_str()?.strip_suffix(".toml")?.to_owned()));
     let found = |name: &str, steps| match rig(name) {
-        rig if rig.actuator.acceleration.is_some() => change_in_all_ticks(&rig, steps),
+        rig if rig.actuator.held().is_motion() => change_in_all_ticks(&rig, steps),
         rig => change(&rig, steps, 1.0),
     };
     let of_all: Vec<_> = names.map(|name| (found(&name, [4, 8]), name)).collect();

@@ -40,7 +40,7 @@ fn every_rig_file_is_good_and_named_after_its_rig() {
         let rig = Rig::from_path(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(file.file_stem().unwrap().to_str().unwrap(), rig.name);
         assert!(rig.lqr.is_some());
-        assert!(rig.pole_placement.is_some() || rig.actuator.acceleration.is_some());
+        assert!(rig.pole_placement.is_some() || rig.actuator.held().is_motion());
         assert!(rig.kalman.is_some() || matches!(rig.plant, PlantDescription::Model(_)));
     }
 }
@@ -111,7 +111,7 @@ fn what_is_left_out_gets_its_documented_default() {
 #[test]
 fn defaults_of_the_motor() {
     let motor = "[actuator]\ntorque_constant_n_m_per_a = 0.01\nresistance_ohm = 1\npulley_radius_m = 0.01\nsupply_v = 12\n";
-    let motor = parse(&format!("{MINIMAL}{motor}")).actuator.motor.unwrap();
+    let motor = parse(&format!("{MINIMAL}{motor}")).actuator.motor().unwrap().clone();
     assert_eq!((motor.gear_ratio, motor.dead_zone_v, motor.slew_v_per_s), (1.0, 0.0, None));
 }
 
@@ -120,7 +120,7 @@ fn defaults_of_the_motor() {
 fn torque_and_back_emf_constants_may_differ() {
     let motor = |more: &str| {
         let data = "torque_constant_n_m_per_a = 0.1336\nresistance_ohm = 10.692\npulley_radius_m = 0.0198\nsupply_v = 12\n";
-        parse(&format!("{MINIMAL}[actuator]\n{data}{more}")).actuator.motor.unwrap()
+        parse(&format!("{MINIMAL}[actuator]\n{data}{more}")).actuator.motor().unwrap().clone()
     };
     let close = |x: f64, wanted: f64| assert!((x / wanted - 1.0).abs() < 1e-3, "{x} instead of {wanted}");
     let real = motor("back_emf_constant_v_s_per_rad = 0.2842\n");
@@ -149,7 +149,7 @@ fn a_motor_that_is_known_by_its_motion_is_described_by_one_newton_per_ampere() {
     );
     let rig = parse(&text);
     assert_eq!(rig.unusual_values(), []);
-    let motor = rig.actuator.motor.unwrap();
+    let motor = rig.actuator.motor().unwrap();
     assert!((motor.newtons_per_amp() - 1.0).abs() < 1e-12);
     let plant = MotorPlant::of(&motor);
     for (duty, speed) in [(1.0, 0.0), (0.5, 0.3), (-0.75, -0.2)] {

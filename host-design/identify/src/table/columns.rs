@@ -42,7 +42,7 @@ impl RecordingColumns {
         let sensors = rig.sensors();
         let links = sensors.len() - 1;
         let meanings = meanings(table, links)?;
-        let supply_v = rig.actuator.motor.as_ref().map(|motor| motor.supply_v);
+        let supply_v = rig.actuator.motor().map(|motor| motor.supply_v);
         let mut columns = Self {
             time: None,
             period_s: reading.period_s,

@@ -143,11 +143,9 @@ fn readings_that_are_old_are_known_if_the_file_states_their_age() {
 #[test]
 fn a_force_that_follows_late_is_known_if_the_file_states_its_lag() {
     let with = |lag_s: f64, reality: &str| {
-        let rig = rig(reality);
-        Rig {
-            actuator: upright_design::rig::Actuator { driver_lag_s: Some(lag_s), ..rig.actuator.clone() },
-            ..rig
-        }
+        let mut rig = rig(reality);
+        rig.actuator.force_mut().unwrap().lag_s = Some(lag_s);
+        rig
     };
     let (truth, file) = (with(4e-3, REALITY), with(4e-3, ""));
     let log = shake(&truth, 15.0, 3).unwrap();
@@ -238,7 +236,7 @@ fn the_excitation_keeps_the_model_within_its_rail() {
     for name in ["single-quanser-ip02", "triple-glueck-eder-kugi", "quadruple-paper"] {
         let rig = Rig::from_path(Path::new(&format!("../../rigs/{name}.toml"))).unwrap();
         let excitation = Excitation::design(&rig, 20.0, 1).unwrap();
-        let most = rig.force_limit_n().unwrap();
+        let most = rig.actuator.largest_force_n().unwrap();
         assert!(excitation.amplitude_n > 1e-4 * most, "{name}: {excitation:?}");
         assert_eq!(excitation.force_n(0.0, 0.0, 0.0), 0.0);
     }

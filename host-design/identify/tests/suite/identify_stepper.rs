@@ -41,7 +41,7 @@ fn with_drive(log: &Log, [counts, pulses]: [i64; 2], step_m: f64) -> Log {
 }
 
 fn step_m(rig: &Rig) -> f64 {
-    rig.actuator.acceleration.as_ref().unwrap().step_m
+    rig.actuator.pulses().unwrap().step_m
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn a_step_that_is_a_little_too_long_is_told_and_a_right_one_is_not() {
     let file = rig("single", "");
     let travel = |step: f64| {
         let mut machine = file.clone();
-        machine.actuator.acceleration.as_mut().unwrap().step_m *= step;
+        machine.actuator.pulses_mut().unwrap().step_m *= step;
         let log = with_drive(&shake(&machine, 15.0, 1).unwrap(), [1, 1], step_m(&file));
         let found = run(&file, &log, true).unwrap();
         found.doubts.iter().find_map(|doubt| match doubt {
@@ -157,7 +157,7 @@ fn the_firmware_shakes_within_the_limits_of_the_drive_and_its_log_identifies_the
         let table = TableValues::of(&file, &certified, Gains::Sampled).unwrap();
         let log = with_firmware(&table, |target| shake_with(&machine, &table, target, 10.0, 1)).unwrap();
         let log = log.unwrap();
-        let (drive, period_s) = (file.actuator.acceleration.as_ref().unwrap(), file.tick.period_s);
+        let (drive, period_s) = (file.actuator.pulses().unwrap(), file.tick.period_s);
         let speeds: Vec<f64> =
             log.ticks().iter().map(|tick| log.drive(tick) * drive.step_m / period_s).collect();
         // A tick has up to a pulse more than its speed needs, one of two after each other up to two.

@@ -89,7 +89,7 @@ fn shaken_on(slope_rad: f64) -> Planted {
     let number = |line: &str, column: usize| line.split(',').nth(column).unwrap().parse().unwrap_or(0.0);
     let all: Vec<[f64; 5]> =
         csv.lines().skip(1).map(|line| columns.map(|column| number(line, column))).collect();
-    let supply_v = file.actuator.motor.as_ref().unwrap().supply_v;
+    let supply_v = file.actuator.motor().unwrap().supply_v;
     let volts = |row: &[f64; 5]| row[3] * if row[4] > 0.0 { row[4] } else { supply_v };
     let mean = |rows: &[[f64; 5]]| {
         let volts = rows.iter().map(volts).sum::<f64>() / rows.len() as f64;

@@ -62,7 +62,7 @@ impl Property {
     /// All properties of a machine as designed for, in the order of the page. The cart of a drive that takes pulses
     /// goes where they say; forces on it matter only if `[reality]` has the motor.
     fn all_of(rig: &Rig) -> Vec<Self> {
-        let takes_pulses = rig.actuator.acceleration.is_some();
+        let takes_pulses = rig.actuator.held().is_motion();
         let feels_forces = !takes_pulses || rig.reality.step_motor.holding_force_n.is_some();
         let mass = Changed::Rig(|rig, more| {
             let percent = &mut rig.reality.parameters.link_mass_percent;

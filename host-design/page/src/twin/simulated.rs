@@ -105,7 +105,7 @@ impl<'a, 't> World<'a, 't> {
             t_s: 0.0,
             epoch,
             restart: None,
-            pulse_m: rig.actuator.acceleration.as_ref().map(|drive| drive.step_m),
+            pulse_m: rig.actuator.pulses().map(|drive| drive.step_m),
         };
         world.rebuild()?;
         Ok(world)

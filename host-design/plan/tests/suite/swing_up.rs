@@ -56,7 +56,7 @@ fn steppers_raise_and_lower_themselves_unless_the_drive_is_too_slow() {
             );
         }
         let mut slow = rig.clone();
-        let drive = slow.actuator.acceleration.as_mut().unwrap();
+        let drive = slow.actuator.pulses_mut().unwrap();
         drive.speed_limit_m_per_s = Some(0.5 * drive.speed_limit_m_per_s.unwrap());
         let error = refined(&slow, &rig_and_stored(name).1).unwrap_err().to_string();
         assert!(error.contains("the limit of the cart speed is exceeded"), "{name}: {error}");

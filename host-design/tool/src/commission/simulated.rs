@@ -78,7 +78,7 @@ impl<'a> Simulated<'a> {
             counters: vec![0; table.sensors()],
             supply_v: table.drive.supply_v().unwrap_or_default(),
             rail: RailEnds::of(&machine),
-            pulse_m: machine.actuator.acceleration.as_ref().map(|drive| drive.step_m),
+            pulse_m: machine.actuator.pulses().map(|drive| drive.step_m),
             period_s: machine.tick.period_s,
             ticks: 0,
         })

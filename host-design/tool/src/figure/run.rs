@@ -96,7 +96,7 @@ impl DrawnRun<'_> {
             0,
             self.curve(|sample| sample.force),
         ));
-        match self.rig.input_limit() {
+        match self.rig.actuator.largest_input() {
             Some(limit) => {
                 panel.with(self.limits(&format!("limit ±{} {unit}", number(limit)), [-limit, limit]))
             }

@@ -45,7 +45,7 @@ pub(super) fn scenes(
     seed: u64,
 ) -> Result<Vec<Scene>, SimulationError> {
     let base = Scenario {
-        sensing: if rig.actuator.acceleration.is_some() { Sensing::Encoders } else { Sensing::FullState },
+        sensing: if rig.actuator.held().is_motion() { Sensing::Encoders } else { Sensing::FullState },
         duration_s: duration(rig, poles),
         seed,
         substeps: 4,

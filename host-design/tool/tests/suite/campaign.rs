@@ -42,7 +42,7 @@ fn every_defect_is_found_and_nothing_else() {
 #[test]
 fn a_late_force_that_the_rig_file_states_hides_no_defect() {
     let mut rig = rig_and_table("quadruple-paper").0.clone();
-    rig.actuator.driver_lag_s = Some(0.002);
+    rig.actuator.force_mut().unwrap().lag_s = Some(0.002);
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     let kinds = kinds(&table, RunPlace::Host);
     for row in &run(&on_host(&rig, &table), &kinds, 5 * kinds.len() as u64).rows {

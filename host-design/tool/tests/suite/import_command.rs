@@ -52,7 +52,7 @@ fn masses_lengths_and_inertias_are_those_of_the_bodies() {
     close(upper.centre_of_mass_m.unwrap(), 0.2);
     close(upper.inertia_kg_m2.unwrap(), 7.5e-4 + 0.2 * 0.05 * 0.05);
     close(upper.length_m, 0.4);
-    assert_eq!(rig.actuator.force_limit_n, Some(12.0));
+    assert_eq!(rig.actuator.force().unwrap().limit_n, Some(12.0));
     assert_eq!(rig.reality.friction.cart_friction_n, 0.5);
     assert_eq!([0, 1].map(|joint| rig.reality.friction.joint_friction_n_m.of_joint(joint)), [2e-4, 0.0]);
     // What a URDF does not have is marked; nothing else is.

@@ -15,11 +15,12 @@ use crate::published::rig_and_table;
 #[test]
 fn the_image_makes_up_for_a_late_force_and_old_readings_with_the_bits_of_the_host() {
     let mut force = rig_and_table("quadruple-paper").0.clone();
-    force.actuator.driver_lag_s = Some(0.002);
+    force.actuator.force_mut().unwrap().lag_s = Some(0.002);
     let mut readings = rig_and_table("double-quanser-dbpen").0.clone();
     readings.chain_mut().unwrap().links.iter_mut().for_each(|link| link.sensor_delay_s = 0.002);
     let mut both = rig_and_table("single-quanser-ip02").0.clone();
-    (both.actuator.driver_lag_s, both.tick.delay_ticks, both.swing_up) = (Some(0.004), 1, None);
+    both.actuator.force_mut().unwrap().lag_s = Some(0.004);
+    (both.tick.delay_ticks, both.swing_up) = (1, None);
     for rig in [force, readings, both] {
         let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
         let Some(elf) = built_for(BoardName::WeactF405, &rig, &table) else { return };

@@ -135,7 +135,7 @@ fn compared(name: &'static str, scenario: &Scenario, image: &Image) -> (Recordin
     let samples: Vec<(f64, f64)> =
         recording.trace.samples().map(|sample| (sample.t, sample.state[0])).collect();
     let [(begin_s, from_m), .., (end_s, to_m)] = samples[..] else { panic!("{} samples", samples.len()) };
-    let way = (to_m - from_m) / rig.actuator.acceleration.as_ref().unwrap().step_m;
+    let way = (to_m - from_m) / rig.actuator.pulses().unwrap().step_m;
     let (number, all) = (((end_s - begin_s) / rig.tick.period_s).round() as usize, &counted.of_ticks);
     let off = |shift: usize| {
         let end = all.len() - shift;

@@ -19,7 +19,7 @@ impl NeededForce {
     /// None unless the drive imposes the acceleration of a cart whose mass is given.
     pub(super) fn of(rig: &Rig) -> Option<Self> {
         let chain = rig.chain().filter(|chain| chain.cart.mass_kg.is_some())?;
-        rig.actuator.acceleration.as_ref()?;
+        rig.actuator.pulses()?;
         let pulled = Chain { input: CartInput::Force, ..chain.clone() };
         let model = linearise(&ChainParameters::<f64>::of(&pulled), Equilibrium::UPRIGHT).ok()?;
         let motor = &rig.reality.step_motor;

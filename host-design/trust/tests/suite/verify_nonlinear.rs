@@ -26,7 +26,7 @@ fn rig(name: &str) -> Rig {
 }
 
 fn with_force_limit(mut rig: Rig, limit_n: f64) -> Rig {
-    rig.actuator.force_limit_n = Some(limit_n);
+    rig.actuator.force_mut().unwrap().limit_n = Some(limit_n);
     rig
 }
 
@@ -105,7 +105,7 @@ fn too_weak_a_motor_holds_less_and_finally_nothing() {
     };
     // A quarter of the supply, and a table for it: the edge is lower.
     let mut weak = strong.clone();
-    weak.actuator.motor.as_mut().unwrap().supply_v /= 4.0;
+    weak.actuator.motor_mut().unwrap().supply_v /= 4.0;
     assert!(edge(&weak, &table(&weak)) < 0.7 * edge(strong, strong_table));
 
     let (paper, _) = &*PAPER;

@@ -1,6 +1,6 @@
 //! `[actuator]`: force limit and motor, or a drive whose input is the cart's acceleration.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::super::error::RigError;
 use super::super::held::{Held, lag_at};
@@ -51,37 +51,133 @@ const FORCE: &[Key] = &[
 const BELOW_SUPPLY: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0 and < supply_v (V)");
 const WITH_A_MOTOR: Absent = Absent::RequiredIf("with a motor");
 
-/// The actuator, `[actuator]`: force limit and motor, or a drive that imposes the cart's acceleration.
-#[derive(Debug, Clone, PartialEq, Serialize, Default)]
-pub struct Actuator {
-    /// Largest force on the cart (N); none: no limit.
-    pub force_limit_n: Option<f64>,
-    /// Time constant (s) with which the force follows its command; none: at once.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub driver_lag_s: Option<f64>,
-    /// The DC motor, if described.
-    pub motor: Option<Motor>,
-    /// The drive, if it imposes the cart's acceleration; then there is neither force limit nor motor.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub acceleration: Option<AccelerationDrive>,
+/// The drive of the cart, `[actuator]`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Actuator {
+    /// It produces the commanded force: a motor whose current is controlled.
+    Force(ForceDrive),
+    /// A DC motor that is given a voltage, and the limits of its driver.
+    Motor(Motor, ForceDrive),
+    /// It moves the cart by pulses, whatever force that takes.
+    Pulses(AccelerationDrive),
+}
+
+/// What limits and delays the force of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ForceDrive {
+    /// `force_limit_n`: largest force on the cart (N); none: no limit.
+    pub limit_n: Option<f64>,
+    /// `driver_lag_s`: time constant (s) with which the force follows its command; none: at once.
+    pub lag_s: Option<f64>,
+}
+
+impl Default for Actuator {
+    /// Any force, at once.
+    fn default() -> Self {
+        Self::Force(ForceDrive::default())
+    }
+}
+
+/// The keys of the file, in which a kind has only its own.
+impl Serialize for Actuator {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct GivenKeys<'a> {
+            force_limit_n: Option<f64>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            driver_lag_s: Option<f64>,
+            motor: Option<&'a Motor>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            acceleration: Option<&'a AccelerationDrive>,
+        }
+        let force = self.force().copied().unwrap_or_default();
+        GivenKeys {
+            force_limit_n: force.limit_n,
+            driver_lag_s: force.lag_s,
+            motor: self.motor(),
+            acceleration: self.pulses(),
+        }
+        .serialize(serializer)
+    }
 }
 
 impl Actuator {
+    /// What the drive holds during a tick.
+    pub fn held(&self) -> Held {
+        match self {
+            Self::Force(_) => Held::Force,
+            Self::Motor(motor, _) => Held::Voltage { braking_n_s_per_m: motor.braking_n_s_per_m() },
+            Self::Pulses(drive) => match drive.bandwidth_hz {
+                Some(bandwidth_hz) => Held::LaggingSpeed { lag_s: lag_at(bandwidth_hz) },
+                None => Held::MeanSpeed,
+            },
+        }
+    }
+
     /// What the drive imposes on the cart.
     pub fn input(&self) -> CartInput {
         if self.held().is_motion() { CartInput::Acceleration } else { CartInput::Force }
     }
 
-    /// What the drive holds during a tick.
-    pub fn held(&self) -> Held {
-        match (&self.acceleration, &self.motor) {
-            (Some(drive), _) => match drive.bandwidth_hz {
-                Some(bandwidth_hz) => Held::LaggingSpeed { lag_s: lag_at(bandwidth_hz) },
-                None => Held::MeanSpeed,
-            },
-            (None, Some(motor)) => Held::Voltage { braking_n_s_per_m: motor.braking_n_s_per_m() },
-            (None, None) => Held::Force,
+    /// Largest force on the cart (N): the smaller of the file's limit and the motor's force at standstill, where given.
+    /// None: no limit, or a drive that applies whatever force its motion takes.
+    pub fn largest_force_n(&self) -> Option<f64> {
+        let stall_n = self.motor().map(Motor::stall_force_n);
+        self.force()?.limit_n.into_iter().chain(stall_n).reduce(f64::min)
+    }
+
+    /// Largest input of the plant: force on the cart (N), or its acceleration (m/s²). None: no limit.
+    pub fn largest_input(&self) -> Option<f64> {
+        match self {
+            Self::Force(_) | Self::Motor(..) => self.largest_force_n(),
+            Self::Pulses(drive) => Some(drive.acceleration_limit_m_per_s2),
         }
+    }
+
+    /// Largest speed of the cart that the drive is asked for with ticks of `period_s` (m/s); none: no limit.
+    pub fn largest_speed_m_per_s(&self, period_s: f64) -> Option<f64> {
+        self.pulses()?.largest_speed_m_per_s(period_s)
+    }
+
+    /// The motor of a drive that has one.
+    pub fn motor(&self) -> Option<&Motor> {
+        if let Self::Motor(motor, _) = self { Some(motor) } else { None }
+    }
+
+    /// The same, to be changed.
+    pub fn motor_mut(&mut self) -> Option<&mut Motor> {
+        if let Self::Motor(motor, _) = self { Some(motor) } else { None }
+    }
+
+    /// Limit and lag of a drive that pushes with a force.
+    pub fn force(&self) -> Option<&ForceDrive> {
+        match self {
+            Self::Force(force) | Self::Motor(_, force) => Some(force),
+            Self::Pulses(_) => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn force_mut(&mut self) -> Option<&mut ForceDrive> {
+        match self {
+            Self::Force(force) | Self::Motor(_, force) => Some(force),
+            Self::Pulses(_) => None,
+        }
+    }
+
+    /// Time constant with which the force follows its command (s); none: at once.
+    pub fn lag_s(&self) -> Option<f64> {
+        self.force()?.lag_s
+    }
+
+    /// The drive that takes pulses.
+    pub fn pulses(&self) -> Option<&AccelerationDrive> {
+        if let Self::Pulses(drive) = self { Some(drive) } else { None }
+    }
+
+    /// The same, to be changed.
+    pub fn pulses_mut(&mut self) -> Option<&mut AccelerationDrive> {
+        if let Self::Pulses(drive) = self { Some(drive) } else { None }
     }
 }
 
@@ -226,14 +322,11 @@ pub(crate) fn actuator(node: &Node<'_>, tick: &Tick) -> Result<Actuator, RigErro
         return Err(node.out_of_range(accepts, remedy));
     }
     if is_acceleration {
-        let acceleration = Some(acceleration(&table, tick)?);
-        return Ok(Actuator { acceleration, ..Actuator::default() });
+        return acceleration(&table, tick).map(Actuator::Pulses);
     }
-    let force_limit_n = table.value("force_limit_n")?;
-    let driver_lag_s = table.value("driver_lag_s")?;
+    let force = ForceDrive { limit_n: table.value("force_limit_n")?, lag_s: table.value("driver_lag_s")? };
     let described = Motor::KEYS.iter().any(|key| table.get(key.name).is_some());
-    let motor = described.then(|| motor(&table)).transpose()?;
-    Ok(Actuator { force_limit_n, driver_lag_s, motor, acceleration: None })
+    Ok(if described { Actuator::Motor(motor(&table)?, force) } else { Actuator::Force(force) })
 }
 
 /// A tick needs room for pulses, and its pulses begin in the same tick.
@@ -280,7 +373,7 @@ mod tests {
             "name = \"a\"\n[cart]\nmass_kg = 1\n[[link]]\nmass_kg = 1\nlength_m = 1\n[actuator]\nresistance_ohm = 2.9011\n\
              torque_constant_n_m_per_a = 0.05\npulley_radius_m = 0.01\nsupply_v = 6\n{key}\n"
         );
-        Rig::from_toml(&text, Path::new("rig.toml")).map(|rig| rig.actuator.motor.unwrap())
+        Rig::from_toml(&text, Path::new("rig.toml")).map(|rig| rig.actuator.motor().unwrap().clone())
     }
 
     /// An L298N takes 2 V of the 6 V of a motor that would push with 10.341 N.

@@ -100,7 +100,7 @@ pub enum Allowance {
         /// The key.
         key: &'static str,
         /// Its value.
-        at: fn(&mut Actuator) -> &mut Option<f64>,
+        at: fn(&mut Actuator) -> Option<&mut Option<f64>>,
     },
 }
 
@@ -330,7 +330,10 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
         drives: SimulatedDrives::OfForce(
             "is not simulated with a stepper; see `least bandwidth` of `upright verify`",
         ),
-        allowance: Some(Allowance::Stated { key: "driver_lag_s", at: |actuator| &mut actuator.driver_lag_s }),
+        allowance: Some(Allowance::Stated {
+            key: "driver_lag_s",
+            at: |actuator| Some(&mut actuator.force_mut()?.lag_s),
+        }),
         ..imperfection!(
             driver.driver_lag_s,
             "s",

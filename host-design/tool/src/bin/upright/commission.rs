@@ -207,7 +207,7 @@ impl CommissionCommand {
         if machine.tick.period_s != rig.tick.period_s {
             return Err(differs("period_s"));
         }
-        if machine.actuator.motor.is_some() != rig.actuator.motor.is_some() {
+        if machine.actuator.motor().is_some() != rig.actuator.motor().is_some() {
             return Err(differs("kind of actuator"));
         }
         Ok(machine)

@@ -70,14 +70,16 @@ impl Variation {
     /// The rig with its changes, its design, and the table with the gains asked for.
     pub(crate) fn designed(&self) -> Result<(Rig, Certified, TableValues), Failure> {
         let mut rig = Rig::from_path(&self.rig)?;
-        if rig.actuator.acceleration.is_some() && (self.delay == Some(1) || self.force_limit.is_some()) {
+        if rig.actuator.held().is_motion() && (self.delay == Some(1) || self.force_limit.is_some()) {
             return Err(Failure::argument(
                 "--delay 1 and --force-limit: not with kind = \"acceleration\" in [actuator]; leave them out",
             ));
         }
         rig.tick.period_s = self.tick.unwrap_or(rig.tick.period_s);
         rig.tick.delay_ticks = self.delay.unwrap_or(rig.tick.delay_ticks);
-        rig.actuator.force_limit_n = self.force_limit.or(rig.actuator.force_limit_n);
+        if let Some(force) = rig.actuator.force_mut() {
+            force.limit_n = self.force_limit.or(force.limit_n);
+        }
         let gains = match self.gains {
             GainsName::Sampled => Gains::Sampled,
             GainsName::Continuous => Gains::Continuous,

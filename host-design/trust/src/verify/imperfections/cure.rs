@@ -26,7 +26,7 @@ impl<'a> Cures<'a> {
     pub(super) fn of(rig: &'a Rig, table: &'a TableValues, law: Law) -> Result<Self, VerifyError> {
         let own = Uncertified::sampled_alone(&rig.with_law_alone(law))?;
         let mut cures = Self { rig, table, law, own, of_all: Vec::new() };
-        let friction_n = rounded(FORCE_SHARE * rig.force_limit_n().unwrap_or_default(), 2);
+        let friction_n = rounded(FORCE_SHARE * rig.actuator.largest_force_n().unwrap_or_default(), 2);
         cures.of_all = [(Tolerances::CART_FRICTION, friction_n), (Tolerances::HOMING_ERROR, ZERO_RAD)]
             .into_iter()
             .filter(|(_, size)| *size > 0.0)
@@ -59,11 +59,11 @@ impl<'a> Cures<'a> {
     fn stating(
         &self,
         key: &str,
-        at: fn(&mut Actuator) -> &mut Option<f64>,
+        at: fn(&mut Actuator) -> Option<&mut Option<f64>>,
         size: f64,
     ) -> Option<(String, TableValues)> {
         let mut rig = self.rig.with_law_alone(self.law);
-        if at(&mut rig.actuator).replace(size).is_some() {
+        if at(&mut rig.actuator)?.replace(size).is_some() {
             return None;
         }
         let table = TableValues::of_uncertified(&rig, &Uncertified::sampled_alone(&rig).ok()?).ok()?;

@@ -62,7 +62,7 @@ fn write_design(
         }
         match &report.run {
             Some(run) => writeln!(out, "  closed loop, firmware against {plant}: {run}")?,
-            None if rig.actuator.acceleration.is_some() && rig.kalman.is_none() => {
+            None if rig.actuator.held().is_motion() && rig.kalman.is_none() => {
                 writeln!(
                     out,
                     "  no closed loop: a drive that counts its own pulses needs an observer, [kalman]"
@@ -141,7 +141,7 @@ pub(super) fn warnings(
             "the loop is too slow for a bound on its step response: the set-point is not governed".to_owned(),
         );
     }
-    if rig.input_limit().is_none() {
+    if rig.actuator.largest_input().is_none() {
         warnings
             .push("no force limit: give actuator.force_limit_n or a motor before connecting one".to_owned());
     }
