@@ -1,7 +1,7 @@
 //! What a page draws of a rig before it is designed.
 
 use serde_json::{Value, json};
-use upright_design::rig::{CartInput, LinkEncoder, PlantDescription, Rig};
+use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
 
 /// Names, lengths and travel; the weights that can be changed while one looks; values that no bench has.
 pub(crate) fn sketch(rig: &Rig) -> Value {
@@ -13,13 +13,8 @@ pub(crate) fn sketch(rig: &Rig) -> Value {
     };
     // Without a limit, JSON has null.
     let travel_m = travel_m.map(|end| end.filter(|end: &f64| end.is_finite()));
-    let input = match (&rig.plant, rig.actuator.input()) {
-        (PlantDescription::Model(_), _) => "input",
-        (_, CartInput::Force) => "force (N)",
-        (_, CartInput::Acceleration) => "acceleration (m/s²)",
-    };
     json!({
-        "input": input,
+        "input": rig.input_quantity().title(),
         "rig": rig.name,
         "lengths_m": lengths_m,
         "travel_m": travel_m,

@@ -9,7 +9,7 @@ use super::scenario::Scenario;
 use super::trace::Trace;
 use crate::number::significant;
 use crate::plant::absolute_angles;
-use crate::rig::{CartInput, PlantDescription, Rig};
+use crate::rig::{CartInput, PlantDescription, Quantity, Rig};
 
 /// Loss of balance, which ends a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -186,6 +186,16 @@ impl Summary {
         ))
     }
 
+    /// A model has no angles, and units of its own.
+    fn is_of_model(&self) -> bool {
+        self.peak_angles_rad.is_empty()
+    }
+
+    /// What moved the plant.
+    pub fn input_quantity(&self) -> Quantity {
+        if self.is_of_model() { Quantity::OF_MODEL } else { self.input.quantity() }
+    }
+
     /// Whether the rig is still up at the end of the run.
     pub fn survives(&self) -> bool {
         self.fall.is_none()
@@ -205,14 +215,11 @@ impl fmt::Display for Summary {
         for (index, angle) in self.peak_angles_rad.iter().enumerate() {
             writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
         }
-        // A model has no angles, and units of its own.
-        let [input, n, m] = match self.input {
-            _ if self.peak_angles_rad.is_empty() => ["input", "", ""],
-            CartInput::Force => ["force", " N", " m"],
-            CartInput::Acceleration => ["accel", " m/s²", " m"],
-        };
-        let (peak, requested) = (self.peak_force_n, self.peak_requested_force_n);
-        writeln!(f, "  peak {input}     {peak:.3}{n} (requested: {requested:.3}{n})")?;
+        let (input, m) = (self.input_quantity(), if self.is_of_model() { "" } else { " m" });
+        let [peak, requested] =
+            [self.peak_force_n, self.peak_requested_force_n].map(|x| input.of(&format!("{x:.3}")));
+        // As wide as "peak theta1".
+        writeln!(f, "  peak {:.5}     {peak} (requested: {requested})", input.name)?;
         write!(f, "  final error    {:.2e}{m}", self.final_error_m)
     }
 }

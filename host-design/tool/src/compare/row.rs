@@ -27,13 +27,16 @@ pub struct ComparedRow {
 }
 
 /// What the drives of these rows impose on their carts, with its unit, as words.
-pub(super) fn input(rows: &[ComparedRow]) -> &'static str {
-    let has = |input: CartInput| rows.iter().any(|row| row.input == input);
-    match (has(CartInput::Force), has(CartInput::Acceleration)) {
-        (true, true) => "force (N) or acceleration (m/s²)",
-        (false, true) => "acceleration (m/s²)",
-        _ => "force (N)",
+pub(super) fn input(rows: &[ComparedRow]) -> String {
+    let mut inputs: Vec<CartInput> = Vec::new();
+    for row in rows {
+        if !inputs.contains(&row.input) {
+            inputs.push(row.input);
+        }
     }
+    inputs.sort_by_key(|input| !input.is_force());
+    let titles: Vec<String> = inputs.into_iter().map(|input| input.quantity().title()).collect();
+    titles.join(" or ")
 }
 
 /// How a run ended, or why there was none.

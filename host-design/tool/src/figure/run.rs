@@ -1,7 +1,7 @@
 //! A simulated run over time as a figure.
 
 use upright_design::number::significant;
-use upright_design::rig::{CartInput, Chain, PlantDescription, Rig};
+use upright_design::rig::{Chain, PlantDescription, Rig};
 use upright_design::simulate::{Sample, Trace};
 
 use super::{Axis, Curve, Figure, FigureError, Panel};
@@ -87,18 +87,15 @@ impl DrawnRun<'_> {
         let is_cut_off = self.trace.samples().any(|sample| sample.requested.abs() > largest);
         let name = if is_cut_off { "requested (cut off)" } else { "requested" };
         let requested = self.curve(|sample| sample.requested.clamp(-largest, largest));
-        let (title, unit) = match self.rig.actuator.input() {
-            CartInput::Force => ("force (N)", "N"),
-            CartInput::Acceleration => ("acceleration (m/s²)", "m/s²"),
-        };
-        let panel = self.panel(title).with(Curve::reference(name, requested)).with(Curve::line(
+        let input = self.rig.input_quantity();
+        let panel = self.panel(&input.title()).with(Curve::reference(name, requested)).with(Curve::line(
             "u",
             0,
             self.curve(|sample| sample.force),
         ));
         match self.rig.actuator.largest_input() {
             Some(limit) => {
-                panel.with(self.limits(&format!("limit ±{} {unit}", number(limit)), [-limit, limit]))
+                panel.with(self.limits(&format!("limit ±{}", input.of(&number(limit))), [-limit, limit]))
             }
             None => panel,
         }

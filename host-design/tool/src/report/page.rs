@@ -14,7 +14,7 @@ use super::{ReportError, ReportSource};
 use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::policy;
 use upright_design::design::{DesignPoles, Feedback};
-use upright_design::rig::{CartInput, PlantDescription, Rig};
+use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::Disturbance;
 use upright_trust::verify::Certificate;
 
@@ -32,7 +32,7 @@ pub(super) struct ReportPage<'a> {
     is_chain: bool,
     is_disturbed: bool,
     /// Name, symbol and unit of the plant's input.
-    input: &'static str,
+    input: String,
     failed: usize,
     checks: Vec<CheckRow>,
     description: String,
@@ -118,6 +118,7 @@ impl<'a> ReportPage<'a> {
         let names = state_names(rig);
         let observer = design.kalman.as_ref().filter(|_| table.observer.is_some());
         let checks = check_rows(trust);
+        let input = rig.actuator.input();
         let style = format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("page.css"));
         Ok(Self {
             name: &rig.name,
@@ -127,10 +128,7 @@ impl<'a> ReportPage<'a> {
             delay_ticks: rig.tick.delay_ticks,
             is_chain: rig.chain().is_some(),
             is_disturbed: Disturbance::of(rig) != Disturbance::NONE,
-            input: match rig.actuator.input() {
-                CartInput::Force => "force u (N)",
-                CartInput::Acceleration => "acceleration u (m/s²)",
-            },
+            input: format!("{} u ({})", input.name(), input.unit()),
             failed: checks.iter().filter(|check| !check.holds).count(),
             checks,
             description: rig.describe(),
@@ -194,12 +192,8 @@ impl RunOutcome {
         if !summary.peak_angles_rad.is_empty() {
             parts.push(format!("largest angle {}°", number(degrees)));
         }
-        let (what, unit) = match summary.input {
-            _ if summary.peak_angles_rad.is_empty() => ("input", ""),
-            CartInput::Force => ("force", " N"),
-            CartInput::Acceleration => ("acceleration", " m/s²"),
-        };
-        parts.push(format!("largest {what} {}{unit}", number(summary.peak_force_n)));
+        let input = summary.input_quantity();
+        parts.push(format!("largest {} {}", input.name, input.of(&number(summary.peak_force_n))));
         Self { law: run.law.title(), survives: summary.survives(), text: parts.join(", ") }
     }
 }

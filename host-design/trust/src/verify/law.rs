@@ -15,7 +15,7 @@ use super::{
 };
 use upright_design::number::significant;
 use upright_design::parallel::{Progress, ProgressStep};
-use upright_design::rig::{CartInput, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::Disturbance;
 use upright_design::table::TableValues;
 
@@ -359,7 +359,7 @@ pub const QUANTITIES: &[TrustQuantity] = &[
             let largest = if step.at_largest_tried { " (largest tried)" } else { "" };
             let m = if is_chain(rig) { " m" } else { "" };
             let peak = force(rig, step.peak_force_n);
-            Some(format!("{}{m}{largest}, peak {} {peak}", number(step.size), input(rig).0))
+            Some(format!("{}{m}{largest}, peak {} {peak}", number(step.size), rig.input_quantity().name))
         }),
     },
     TrustQuantity {
@@ -454,7 +454,12 @@ fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
     }
     let angles: Vec<String> = states.iter().skip(2).step_by(2).map(|&angle| number(1e3 * angle)).collect();
     let cart_mm = number(1e3 * states[rig.output()]);
-    format!("{} {}, cart {cart_mm} mm, angles {} mrad", input(rig).0, force(rig, force_n), angles.join(" "))
+    format!(
+        "{} {}, cart {cart_mm} mm, angles {} mrad",
+        rig.input_quantity().name,
+        force(rig, force_n),
+        angles.join(" ")
+    )
 }
 
 /// A time (s) in milliseconds; `none` if there is no limit.
@@ -500,7 +505,7 @@ fn tilt_rows(rig: &Rig, law: &LawTrust) -> Vec<(String, String)> {
     let row = |tilt: &Tilt| {
         let (size, degrees) = (number(tilt.edge.size), tilt.edge.size.to_degrees());
         let peak = force(rig, tilt.edge.peak_force_n);
-        let value = format!("{size} rad ({degrees:.2}°), peak {} {peak}", input(rig).0);
+        let value = format!("{size} rad ({degrees:.2}°), peak {} {peak}", rig.input_quantity().name);
         (format!("link {}", tilt.link), value)
     };
     tilts.map(row).collect()
@@ -518,16 +523,7 @@ fn is_chain(rig: &Rig) -> bool {
 
 /// A force, the cart's acceleration where the drive imposes that, or the input of a model, with its unit.
 fn force(rig: &Rig, force_n: f64) -> String {
-    format!("{}{}", number(force_n), input(rig).1)
-}
-
-/// Name and unit of the plant's input.
-fn input(rig: &Rig) -> (&'static str, &'static str) {
-    match rig.actuator.input() {
-        _ if !is_chain(rig) => ("input", ""),
-        CartInput::Force => ("force", " N"),
-        CartInput::Acceleration => ("acceleration", " m/s²"),
-    }
+    rig.input_quantity().of(&number(force_n))
 }
 
 /// Signs of a combination, such as `+-+-`.
