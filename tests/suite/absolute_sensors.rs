@@ -9,7 +9,7 @@ use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, record, with_firmware};
+use upright_closed_loop::harness::{World, record, with_firmware};
 use upright_design::design::detection_thresholds;
 use upright_design::numerics::spectral_radius;
 use upright_design::reality::RealEncoders;
@@ -100,20 +100,20 @@ fn homed(rig: &Rig, off_rad: f64) -> (Answer, f64) {
     let values = table(rig);
     let scenario = Scenario::at_rest(rig, Law::Lqr);
     let run = with_firmware(&values, |target| {
-        let mut harness = Harness::new(rig, &values, &scenario, target).unwrap();
+        let mut world = World::new(rig, &values, &scenario, target).unwrap();
         for _ in 0..300 {
-            harness.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
-            tick(&mut harness);
+            world.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
+            tick(&mut world);
         }
-        harness.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
-        let answer = ask(&mut harness, Request::Home);
-        harness.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
+        world.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
+        let answer = ask(&mut world, Request::Home);
+        world.bench.hold(&[0.0, 0.0, PI + off_rad, 0.0]);
         for _ in 0..3 {
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs).unwrap();
+            let inputs = world.inputs();
+            world.session.tick(&inputs).unwrap();
         }
-        let last = std::iter::from_fn(|| harness.session.next_telemetry()).last().unwrap();
-        let is_homed = harness.session.status().state == State::Calibrated;
+        let last = std::iter::from_fn(|| world.session.next_telemetry()).last().unwrap();
+        let is_homed = world.session.status().state == State::Calibrated;
         assert_eq!(is_homed, matches!(answer, Answer::Done), "{answer:?}");
         (answer, f64::from(last.counts[1]) * rig.sensors()[1].step::<f64>())
     });
@@ -171,22 +171,21 @@ fn with_bad_samples(
 /// motor is on, the number of rejected samples, and how far any link leans (rad).
 fn with_readings(rig: &Rig, mut change: impl FnMut(u32, &mut [u32])) -> (Option<Cause>, u32, u32, f64) {
     let (values, scenario) = (table(rig), Scenario::at_rest(rig, Law::Lqr));
-    let watched = balancing(rig, &values, &scenario, |harness| {
+    let watched = balancing(rig, &values, &scenario, |world| {
         let (mut lean_rad, mut ticks) = (0.0f64, 0);
-        let before = rejected(harness);
+        let before = rejected(world);
         for tick in 0..2000 {
-            let mut inputs = harness.inputs();
+            let mut inputs = world.inputs();
             change(tick, &mut inputs.raw_counts);
-            let output = harness.session.tick(&inputs).unwrap();
-            harness.bench.tick(output.drive);
+            let output = world.session.tick(&inputs).unwrap();
+            world.bench.tick(output.drive);
             if !output.enable {
                 break;
             }
-            lean_rad =
-                harness.bench.state()[2..].iter().step_by(2).fold(lean_rad, |lean, x| lean.max(x.abs()));
+            lean_rad = world.bench.state()[2..].iter().step_by(2).fold(lean_rad, |lean, x| lean.max(x.abs()));
             ticks += 1;
         }
-        (cause(harness), ticks, rejected(harness) - before, lean_rad)
+        (cause(world), ticks, rejected(world) - before, lean_rad)
     });
     watched.unwrap()
 }
@@ -269,16 +268,16 @@ fn a_sensor_without_a_good_sample_is_a_fault_with_the_motor_off_too_and_comes_ag
     let rig = absolute("single-quanser-ip02", 4e-4);
     let (values, scenario) = (table(&rig), Scenario::at_rest(&rig, Law::Lqr));
     let run = with_firmware(&values, |target| {
-        let mut harness = Harness::new(&rig, &values, &scenario, target).unwrap();
+        let mut world = World::new(&rig, &values, &scenario, target).unwrap();
         let mut tick = |request, is_bad: bool| {
-            harness.session.send(request);
+            world.session.send(request);
             for _ in 0..300 {
-                harness.bench.hold(&[0.0, 0.0, PI, 0.0]);
-                let mut inputs = harness.inputs();
+                world.bench.hold(&[0.0, 0.0, PI, 0.0]);
+                let mut inputs = world.inputs();
                 inputs.raw_counts[1] ^= if is_bad { BAD_SAMPLE | 0x1234 } else { 0 };
-                harness.session.tick(&inputs).unwrap();
+                world.session.tick(&inputs).unwrap();
             }
-            harness.session.status().state
+            world.session.status().state
         };
         assert_eq!(tick(Request::Statistics, false), State::Disarmed);
         assert_eq!(tick(Request::Home, false), State::Calibrated);

@@ -12,7 +12,7 @@ use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_closed_loop::client::AnyTelemetry;
-use upright_closed_loop::harness::{Harness, RailEnds, record, with_firmware};
+use upright_closed_loop::harness::{RailEnds, World, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, StepDefect};
 use upright_trust::verify::linear;
@@ -59,7 +59,7 @@ fn every_stepper_is_homed_jogged_and_balanced_and_follows_its_set_point() {
 
 /// A hanging rig that nobody holds, with switches at the ends of its rail.
 struct Free<'h, 't> {
-    harness: &'h mut Harness<'t>,
+    world: &'h mut World<'t>,
     ends: RailEnds,
     /// Whether the motor turns the wrong way.
     is_reversed: bool,
@@ -70,19 +70,19 @@ struct Free<'h, 't> {
 
 impl Free<'_, '_> {
     fn tick(&mut self) -> Output {
-        let mut inputs = self.harness.inputs();
+        let mut inputs = self.world.inputs();
         if self.has_switches {
-            self.ends.press(self.harness.bench.state()[0], &mut inputs.contacts);
+            self.ends.press(self.world.bench.state()[0], &mut inputs.contacts);
         }
         if self.is_reversed {
             inputs.raw_counts[0] = inputs.raw_counts[0].wrapping_neg();
         }
         inputs.contacts.emergency_stop = self.emergency_stop;
-        let output = self.harness.session.tick(&inputs).unwrap();
-        while let Some(telemetry) = self.harness.session.next_telemetry() {
+        let output = self.world.session.tick(&inputs).unwrap();
+        while let Some(telemetry) = self.world.session.next_telemetry() {
             self.telemetry = Some(telemetry);
         }
-        self.harness.bench.tick(match output.drive {
+        self.world.bench.tick(match output.drive {
             Drive::Steps(pulses) if self.is_reversed => Drive::Steps(-pulses),
             drive => drive,
         });
@@ -90,10 +90,10 @@ impl Free<'_, '_> {
     }
 
     fn ask(&mut self, request: Request) -> Answer {
-        let id = self.harness.session.send(request);
+        let id = self.world.session.send(request);
         for _ in 0..10 {
             self.tick();
-            while let Some((answered, answer)) = self.harness.session.next_reply() {
+            while let Some((answered, answer)) = self.world.session.next_reply() {
                 if answered == id {
                     return answer;
                 }
@@ -107,13 +107,13 @@ impl Free<'_, '_> {
     }
 
     fn cart_m(&self) -> f64 {
-        self.harness.bench.state()[0]
+        self.world.bench.state()[0]
     }
 
     /// Homes by the switches; returns the time it takes (s).
     fn home(&mut self) -> f64 {
         assert_eq!(self.ask(Request::HomeRail), Answer::Done);
-        let period_s = self.harness.bench.period_s();
+        let period_s = self.world.bench.period_s();
         for tick in 0..6000 {
             self.tick();
             if !matches!(self.telemetry().homing, Homing::Touch { .. } | Homing::HoldStill) {
@@ -128,12 +128,12 @@ impl Free<'_, '_> {
 fn hanging<R>(rig: &Rig, cart_m: f64, action: impl FnOnce(&mut Free<'_, '_>) -> R) -> R {
     let values = table(rig);
     with_firmware(&values, |target| {
-        let mut harness = Harness::new(rig, &values, &Scenario::at_rest(rig, Law::Lqr), target).unwrap();
+        let mut world = World::new(rig, &values, &Scenario::at_rest(rig, Law::Lqr), target).unwrap();
         let mut start = vec![0.0; rig.states()];
         (start[0], start[2]) = (cart_m, PI);
-        harness.bench.hold(&start);
+        world.bench.hold(&start);
         action(&mut Free {
-            harness: &mut harness,
+            world: &mut world,
             ends: RailEnds::of(rig),
             is_reversed: false,
             has_switches: true,
@@ -200,7 +200,7 @@ fn jogged(rig: &Rig, is_reversed: bool, along: bool) -> MotorSign {
         sign_check(free, rig);
         for tick in 0..200 {
             if tick % 5 == 0 {
-                free.harness.session.send(Request::Jog { along });
+                free.world.session.send(Request::Jog { along });
             }
             free.tick();
             if free.telemetry().motor != MotorSign::Unchecked {
@@ -219,9 +219,9 @@ fn sign_check(free: &mut Free<'_, '_>, rig: &Rig) {
     for angle in [0.3, 0.0] {
         for _ in 0..200 {
             state[2] = PI + angle;
-            free.harness.bench.hold(&state);
+            free.world.bench.hold(&state);
             free.tick();
-            free.harness.bench.hold(&state);
+            free.world.bench.hold(&state);
         }
     }
 }
@@ -255,30 +255,30 @@ fn disarming_lets_go_of_the_cart_and_loses_its_position() {
 fn stopped(fault: Fault) -> (Vec<i32>, Option<Fault>) {
     let rig = rig("quadruple-stepper");
     let scenario = Scenario { start: vec![0.0; rig.states()], ..leaning(&rig) };
-    balancing(&rig, &table(&rig), &scenario, |harness| {
-        harness.session.send(Request::Setpoint(0.1));
+    balancing(&rig, &table(&rig), &scenario, |world| {
+        world.session.send(Request::Setpoint(0.1));
         let is_fast = (0..3000).any(|number| {
             if number % 50 == 49 {
-                harness.session.send(Request::KeepAlive);
+                world.session.send(Request::KeepAlive);
             }
-            tick(harness);
-            harness.bench.state()[1].abs() > 0.1
+            tick(world);
+            world.bench.state()[1].abs() > 0.1
         });
         assert!(is_fast);
         let mut pulses = Vec::new();
         for _ in 0..100 {
-            let mut inputs = harness.inputs();
+            let mut inputs = world.inputs();
             inputs.contacts.limit_high = fault == Fault::LimitSwitch;
             inputs.contacts.emergency_stop = fault == Fault::EmergencyStop;
             inputs.contacts.driver_fault = fault == Fault::Driver;
-            let output = harness.session.tick(&inputs).unwrap();
+            let output = world.session.tick(&inputs).unwrap();
             if !output.enable {
                 break;
             }
             pulses.push(output.pulses());
-            harness.bench.tick(output.drive);
+            world.bench.tick(output.drive);
         }
-        (pulses, cause(harness).map(|cause| cause.fault))
+        (pulses, cause(world).map(|cause| cause.fault))
     })
     .unwrap()
 }
@@ -315,13 +315,13 @@ fn the_share_of_its_pulses_that_a_drive_may_miss_is_the_gain_margin() {
     let untested = values.without_tests();
     let stands = |gain: f64| {
         let scenario = Scenario { torque_noise_n_m: 1e-5, ..leaning(&rig) };
-        balancing(&rig, &untested, &scenario, |harness| {
+        balancing(&rig, &untested, &scenario, |world| {
             (0..4000).all(|_| {
-                let inputs = harness.inputs();
-                let output = harness.session.tick(&inputs).unwrap();
-                harness.bench.spoil(StepDefect::Misses(1.0 - gain));
-                harness.bench.tick(output.drive);
-                harness.session.fault().is_none()
+                let inputs = world.inputs();
+                let output = world.session.tick(&inputs).unwrap();
+                world.bench.spoil(StepDefect::Misses(1.0 - gain));
+                world.bench.tick(output.drive);
+                world.session.fault().is_none()
             })
         })
         .unwrap()
@@ -335,23 +335,23 @@ fn the_share_of_its_pulses_that_a_drive_may_miss_is_the_gain_margin() {
 fn found(rig: &Rig, defect: Option<StepDefect>, off_by: u32, seed: u64) -> (Option<Fault>, u32, f64) {
     let expected = (rig.kalman.as_ref().unwrap().joint_noise[0] / rig.tick.period_s).sqrt();
     let scenario = Scenario { seed, torque_noise_n_m: expected.min(1e-4), ..leaning(rig) };
-    balancing(rig, &table(rig), &scenario, |harness| {
+    balancing(rig, &table(rig), &scenario, |world| {
         let mut lean = 0.0f64;
         for number in 0..4000 {
-            let mut inputs = harness.inputs();
+            let mut inputs = world.inputs();
             let since = u32::checked_sub(number, 200);
             if since.is_some() {
                 inputs.raw_counts[0] = inputs.raw_counts[0].wrapping_add(off_by);
-                lean = lean.max(harness.bench.state()[2].abs());
+                lean = lean.max(world.bench.state()[2].abs());
             }
-            let output = harness.session.tick(&inputs).unwrap();
-            if let Some(fault) = harness.session.fault() {
+            let output = world.session.tick(&inputs).unwrap();
+            if let Some(fault) = world.session.fault() {
                 return (Some(fault), since.unwrap_or_default(), lean);
             }
             if let (Some(_), Some(defect)) = (since, defect) {
-                harness.bench.spoil(defect);
+                world.bench.spoil(defect);
             }
-            harness.bench.tick(output.drive);
+            world.bench.tick(output.drive);
         }
         (None, 3800, lean)
     })

@@ -11,7 +11,7 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, with_firmware};
+use upright_closed_loop::harness::{World, with_firmware};
 use upright_design::rig::{PerJoint, Rig};
 use upright_design::simulate::Scenario;
 
@@ -60,14 +60,14 @@ impl Case {
         let values = table(&rig);
         let scenario = Scenario { seed, ..Scenario::at_rest(&rig, Law::Lqr) };
         let run = with_firmware(&values, |target| {
-            let mut harness = Harness::new(&rig, &values, &scenario, target).unwrap();
-            harness.bench.hold(&start);
-            self.ask(&rig, &mut harness, &phases, &steps)
+            let mut world = World::new(&rig, &values, &scenario, target).unwrap();
+            world.bench.hold(&start);
+            self.ask(&rig, &mut world, &phases, &steps)
         });
         run.unwrap()
     }
 
-    fn ask(&self, rig: &Rig, harness: &mut Harness<'_>, phases: &[f64], steps: &[f64]) -> Homed {
+    fn ask(&self, rig: &Rig, world: &mut World<'_>, phases: &[f64], steps: &[f64]) -> Homed {
         let period_s = rig.tick.period_s;
         let (ask_ticks, window) = ((0.05 / period_s) as u32, (5.0 / period_s) as u32);
         let mut pull = vec![0.0; steps.len()];
@@ -76,20 +76,20 @@ impl Case {
             if let Some(pull) = pull.last_mut() {
                 *pull = if (tick / window).is_multiple_of(2) { self.pull_n_m } else { 0.0 };
             }
-            harness.bench.pull(0.0, &pull);
-            harness.bench.tick(Drive::Force(0.0));
+            world.bench.pull(0.0, &pull);
+            world.bench.tick(Drive::Force(0.0));
             if tick.is_multiple_of(ask_ticks) {
-                harness.session.send(Request::Home);
+                world.session.send(Request::Home);
             }
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs).unwrap();
-            while let Some((_, answer)) = harness.session.next_reply() {
+            let inputs = world.inputs();
+            world.session.tick(&inputs).unwrap();
+            while let Some((_, answer)) = world.session.next_reply() {
                 if let Answer::NotNow(inhibits) = answer {
                     refused = refused.union(inhibits);
                 }
             }
-            if harness.session.status().state == State::Calibrated {
-                let error_rad = self.error_rad(harness, phases, steps);
+            if world.session.status().state == State::Calibrated {
+                let error_rad = self.error_rad(world, phases, steps);
                 return Homed { at_s: Some(f64::from(tick) * period_s), error_rad, refused };
             }
         }
@@ -97,14 +97,14 @@ impl Case {
     }
 
     /// Largest error of a joint's zero (rad), from the counts of a tick in which nothing moves.
-    fn error_rad(&self, harness: &mut Harness<'_>, phases: &[f64], steps: &[f64]) -> f64 {
-        let inputs = harness.inputs();
+    fn error_rad(&self, world: &mut World<'_>, phases: &[f64], steps: &[f64]) -> f64 {
+        let inputs = world.inputs();
         for _ in 0..4 {
-            harness.session.tick(&inputs).unwrap();
+            world.session.tick(&inputs).unwrap();
         }
-        let last = std::iter::from_fn(|| harness.session.next_telemetry()).last().unwrap();
+        let last = std::iter::from_fn(|| world.session.next_telemetry()).last().unwrap();
         let errors = (0..steps.len()).map(|joint| {
-            let read = ((harness.bench.state()[2 + 2 * joint] + phases[joint]) / steps[joint]).round();
+            let read = ((world.bench.state()[2 + 2 * joint] + phases[joint]) / steps[joint]).round();
             let error = (f64::from(last.counts[joint + 1]) - read) * steps[joint] + phases[joint];
             // A link may have made whole turns.
             error - (error / TAU).round() * TAU

@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, record, with_firmware};
+use upright_closed_loop::harness::{World, record, with_firmware};
 use upright_design::motion::Transition;
 use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
@@ -49,13 +49,13 @@ fn a_link_in_the_dead_band_of_its_potentiometer_is_a_fault_of_that_sensor_with_t
     let end_rad = 2936.0 * TRAVEL_RAD / 4096.0;
     let held_at = |away_rad: f64| {
         let run = with_firmware(&values, |target| {
-            let mut harness = Harness::new(&rig, &values, &scenario, target).unwrap();
+            let mut world = World::new(&rig, &values, &scenario, target).unwrap();
             for _ in 0..300 {
-                harness.bench.hold(&[0.0, 0.0, PI + away_rad, 0.0]);
-                let inputs = harness.inputs();
-                harness.session.tick(&inputs).unwrap();
+                world.bench.hold(&[0.0, 0.0, PI + away_rad, 0.0]);
+                let inputs = world.inputs();
+                world.session.tick(&inputs).unwrap();
             }
-            (harness.session.status().state, cause(&mut harness).map(|cause| (cause.fault, cause.sensor)))
+            (world.session.status().state, cause(&mut world).map(|cause| (cause.fault, cause.sensor)))
         });
         run.unwrap()
     };

@@ -5,7 +5,7 @@ use upright::control::controller::Rejected;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, record, with_firmware};
+use upright_closed_loop::harness::{World, record, with_firmware};
 use upright_design::parallel;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
@@ -60,12 +60,12 @@ fn a_set_point_nearer_to_an_end_of_the_rail_is_refused_with_the_reason() {
         let (rig, table) = rig_and_table(name);
         let scenario = Scenario::at_rest(rig, Law::Lqr);
         let refused = with_firmware(table, |target| {
-            let mut harness = Harness::new(rig, table, &scenario, target).unwrap();
-            harness.raise(None).unwrap();
+            let mut world = World::new(rig, table, &scenario, target).unwrap();
+            world.raise(None).unwrap();
             let [low, high] = table.limits.setpoints_m();
             let mut ask = |position_m: f32| {
-                let inputs = harness.inputs();
-                harness.session.ask(Request::Setpoint(position_m), &inputs).map_err(|error| error.to_string())
+                let inputs = world.inputs();
+                world.session.ask(Request::Setpoint(position_m), &inputs).map_err(|error| error.to_string())
             };
             assert!(ask(low).is_ok() && ask(high).is_ok(), "{name}");
             [low.next_down(), high.next_up(), table.limits.rail_m[1]]

@@ -7,7 +7,7 @@ use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, Pins};
+use upright_closed_loop::harness::{Pins, World};
 use upright_design::rig::Rig;
 use upright_design::simulate::Bench;
 use upright_design::table::TableValues;
@@ -102,18 +102,18 @@ struct Outcome {
 }
 
 /// Lets the rig balance with the defect until the motor is off, for at most `ticks`.
-fn observe(harness: &mut Harness<'_>, mut injection: Injection, ticks: u32) -> Outcome {
+fn observe(world: &mut World<'_>, mut injection: Injection, ticks: u32) -> Outcome {
     // The telemetry is not needed here.
-    harness.session.send(Request::Telemetry(0));
+    world.session.send(Request::Telemetry(0));
     let (mut lean_rad, mut off) = (0.0f64, None);
     for tick in 0..ticks {
-        let mut inputs = harness.inputs();
+        let mut inputs = world.inputs();
         injection.inputs(tick, &mut inputs);
-        let mut output = harness.session.tick(&inputs).unwrap();
+        let mut output = world.session.tick(&inputs).unwrap();
         injection.output(tick, &mut output);
-        harness.bench.tick(output.drive);
+        world.bench.tick(output.drive);
         let mut angle = 0.0;
-        for joint in harness.bench.state()[2..].iter().step_by(2) {
+        for joint in world.bench.state()[2..].iter().step_by(2) {
             angle += joint;
             lean_rad = lean_rad.max(f64::abs(angle));
         }
@@ -122,12 +122,12 @@ fn observe(harness: &mut Harness<'_>, mut injection: Injection, ticks: u32) -> O
             break;
         }
     }
-    let cause = cause(harness);
+    let cause = cause(world);
     Outcome {
         fault: cause.zip(off).map(|(cause, off)| (cause.fault, off + 1 - injection.from)),
         sensor: cause.zip(off).and_then(|(cause, _)| cause.sensor),
         lean_rad,
-        rejected: rejected(harness),
+        rejected: rejected(world),
     }
 }
 
@@ -136,7 +136,7 @@ fn watch(rig: &Rig, values: &TableValues, law: Law, defect: Defect, seed: u64, t
     let full =
         if rig.actuator.motor().is_some() { 1.0 } else { rig.actuator.largest_force_n().unwrap() as f32 };
     let injection = Injection { defect, from: 1000 + 17 * seed as u32, frozen: None, past: Vec::new(), full };
-    balancing(rig, values, &scenario, |harness| observe(harness, injection, ticks)).unwrap()
+    balancing(rig, values, &scenario, |world| observe(world, injection, ticks)).unwrap()
 }
 
 const LAWS: [Law; 2] = Law::ALL;

@@ -10,7 +10,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_closed_loop::harness::Harness;
+use upright_closed_loop::harness::World;
 use upright_design::simulate::Scenario;
 
 fn rejected(reason: Rejected) -> Answer {
@@ -20,9 +20,9 @@ fn rejected(reason: Rejected) -> Answer {
 /// Runs a test with the single pendulum, balancing and undisturbed.
 fn balancing<T>(test: impl FnOnce(&mut Rigged<'_, '_>) -> T) -> T {
     let rig = rig("single-quanser-ip02");
-    balance(&rig, &table(&rig), &Scenario::at_rest(&rig, Law::Lqr), |harness| {
-        while harness.session.next_reply().is_some() || harness.session.next_telemetry().is_some() {}
-        test(&mut Rigged { harness, inputs: Given::default(), output: Output::OFF })
+    balance(&rig, &table(&rig), &Scenario::at_rest(&rig, Law::Lqr), |world| {
+        while world.session.next_reply().is_some() || world.session.next_telemetry().is_some() {}
+        test(&mut Rigged { world, inputs: Given::default(), output: Output::OFF })
     })
     .unwrap()
 }
@@ -38,7 +38,7 @@ struct Given {
 
 /// The rig and its firmware, with inputs set by the test.
 struct Rigged<'h, 't> {
-    harness: &'h mut Harness<'t>,
+    world: &'h mut World<'t>,
     inputs: Given,
     /// Output of the last tick.
     output: Output,
@@ -46,12 +46,12 @@ struct Rigged<'h, 't> {
 
 impl Rigged<'_, '_> {
     fn tick(&mut self) -> Output {
-        let mut inputs = self.harness.inputs();
+        let mut inputs = self.world.inputs();
         inputs.contacts = self.inputs.contacts;
         inputs.supply_v = self.inputs.supply_v.unwrap_or(inputs.supply_v);
         inputs.raw_counts[1] = inputs.raw_counts[1].wrapping_add(self.inputs.counts as u32) & 0xffff;
-        self.output = self.harness.session.tick(&inputs).unwrap();
-        self.harness.bench.tick(self.output.drive);
+        self.output = self.world.session.tick(&inputs).unwrap();
+        self.world.bench.tick(self.output.drive);
         self.output
     }
 
@@ -61,19 +61,19 @@ impl Rigged<'_, '_> {
 
     /// State according to the last telemetry, which describes the tick before the last one.
     fn state(&self) -> State {
-        self.harness.session.status().state
+        self.world.session.status().state
     }
 
     fn fault(&self) -> Option<Fault> {
-        self.harness.session.fault()
+        self.world.session.fault()
     }
 
     /// Takes three ticks: the command arrives in the first, is executed in the second and answered in the third.
     fn ask(&mut self, request: Request) -> Answer {
-        let id = self.harness.session.send(request);
+        let id = self.world.session.send(request);
         self.wait(3);
-        let (answered, answer) = self.harness.session.next_reply().unwrap();
-        assert_eq!((answered, self.harness.session.next_reply()), (id, None));
+        let (answered, answer) = self.world.session.next_reply().unwrap();
+        assert_eq!((answered, self.world.session.next_reply()), (id, None));
         answer
     }
 
@@ -342,7 +342,7 @@ impl Rules {
     fn new(rig: &mut Rigged<'_, '_>) -> Self {
         rig.tick();
         let before = rig.state();
-        while rig.harness.session.next_telemetry().is_some() {}
+        while rig.world.session.next_telemetry().is_some() {}
         // A firmware that is already balancing was armed by hand.
         Self {
             last: (rig.inputs.contacts, rig.output),
@@ -353,7 +353,7 @@ impl Rules {
     }
 
     fn request(&mut self, rig: &mut Rigged<'_, '_>, request: Request) {
-        let id = rig.harness.session.send(request);
+        let id = rig.world.session.send(request);
         if request == Request::Arm {
             self.arms.push(id);
         }
@@ -362,8 +362,8 @@ impl Rules {
     fn tick(&mut self, rig: &mut Rigged<'_, '_>) {
         let output = rig.tick();
         let (contacts, last_output) = std::mem::replace(&mut self.last, (rig.inputs.contacts, output));
-        let telemetry = rig.harness.session.next_telemetry().expect("telemetry of every tick");
-        assert_eq!(rig.harness.session.next_telemetry(), None);
+        let telemetry = rig.world.session.next_telemetry().expect("telemetry of every tick");
+        assert_eq!(rig.world.session.next_telemetry(), None);
         let (before, state) = (self.before, telemetry.state);
         assert!(last_output == Output::OFF || state == State::Balancing, "on in {state:?}");
         if state == State::Armed || (state == State::Balancing && before != State::Balancing) {
@@ -380,7 +380,7 @@ impl Rules {
             self.armed = false;
         }
         // A command is executed at the end of the tick, after its telemetry.
-        while let Some((id, answer)) = rig.harness.session.next_reply() {
+        while let Some((id, answer)) = rig.world.session.next_reply() {
             if self.arms.contains(&id) && answer == Answer::Done {
                 assert!(state == State::Calibrated, "armed in {state:?}");
                 self.armed = true;

@@ -105,4 +105,4 @@ pub use table::{
 pub use verdict::{ChannelFit, Predicted, Refusal};
 pub use window_errors::{ChannelError, WindowErrors};
 pub use wiring::{Wiring, WiringFault, WiringFound};
-pub use with_firmware::{ShakeError, Shaken, checked_and_hanging, shake_with};
+pub use with_firmware::{ShakeError, ShakingHost, checked_and_hanging, shake_with};

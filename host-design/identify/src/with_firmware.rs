@@ -1,12 +1,10 @@
 //! The log of a simulated machine that is shaken by the whole firmware.
 
-use upright::board::Output;
-use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, HarnessError, Pins, Target};
+use upright_closed_loop::harness::{Flow, HarnessError, Participant, Session, Target, World, until};
 use upright_design::reality::hanging_by_hand;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -17,8 +15,6 @@ use crate::feed::Feed;
 use crate::log::Log;
 use crate::recorder::Recorder;
 
-/// Longest time from power-up until the rig is ready (s).
-const READY_S: f64 = 60.0;
 /// Time for which the links hang still before they are shaken (s).
 const STILL_S: f64 = 1.0;
 /// Time between two telemetry messages (s).
@@ -37,14 +33,6 @@ pub enum ShakeError {
     Identify(#[from] IdentifyError),
 }
 
-/// A simulated machine while the firmware shakes it.
-pub struct Shaken<'t> {
-    /// Firmware and machine.
-    pub harness: Harness<'t>,
-    feed: Feed,
-    recorder: Recorder,
-}
-
 /// The log of the simulated machine of `rig`, with its `[reality]`, which the firmware on `target` shakes for
 /// `duration_s`. The run starts at power-up: homing, checks of signs and motor, a pulse each way, the excitation, and
 /// back to the middle.
@@ -58,22 +46,18 @@ pub fn shake_with(
     duration_s: f64,
     seed: u64,
 ) -> Result<Log, ShakeError> {
-    let mut shaken = Shaken::begin(rig, table, target, duration_s, seed)?;
-    let longest = ticks(rig, duration_s + 2.0 + RETURN_S);
-    for _ in 0..longest {
-        shaken.tick(|_| (), |drive| drive)?;
-        if let Some(fault) = shaken.harness.session.fault() {
-            let words = format!("{}: the firmware has turned the motor off: {fault}", rig.name);
-            return Err(IdentifyError::Excitation(words).into());
-        }
-        if shaken.is_over() {
-            break;
-        }
+    let feed = Feed::new(rig, table, duration_s, seed)?;
+    let mut world = checked_and_hanging(rig, table, target, seed)?;
+    let mut host = ShakingHost::begin(feed, rig, table, &mut world)?;
+    world.run(ticks(rig, duration_s + 2.0 + RETURN_S), &mut [&mut host])?;
+    if let Some(fault) = world.session.fault() {
+        let words = format!("{}: the firmware has turned the motor off: {fault}", rig.name);
+        return Err(IdentifyError::Excitation(words).into());
     }
-    Ok(shaken.recorder.finish()?)
+    Ok(host.finish()?)
 }
 
-/// Runs the machine of `rig` from power-up until signs and motor are checked and it hangs still.
+/// Runs the machine of `rig` from power-up until signs and motor are checked and it hangs still in the hand.
 ///
 /// # Errors
 /// [`HarnessError`] if the firmware does not run, or does not get there.
@@ -82,125 +66,93 @@ pub fn checked_and_hanging<'t>(
     table: &TableValues,
     target: &'t mut dyn Target,
     seed: u64,
-) -> Result<Harness<'t>, HarnessError> {
+) -> Result<World<'t>, HarnessError> {
     let mut state = hanging_by_hand(rig);
     let scenario = Scenario { start: state.clone(), seed, ..Scenario::at_rest(rig, Law::Lqr) };
-    let mut harness = Harness::new(rig, table, &scenario, target)?;
-    for tick in 0.. {
-        harness.by_hand(tick)?;
-        let status = harness.session.status();
-        if status.state == State::Calibrated && status.motor == MotorSign::Checked {
-            break;
-        }
-        if tick > ticks(rig, READY_S) {
-            return Err(HarnessError::NotBalancing(status.state));
-        }
-    }
-    state[0] = harness.bench.state()[0];
-    harness.bench.hold(&state);
-    for _ in 0..ticks(rig, STILL_S) {
-        let inputs = harness.inputs();
-        harness.session.tick(&inputs)?;
-    }
-    Ok(harness)
+    let mut world = World::new(rig, table, &scenario, target)?;
+    world.by_hand_until(|status| status.state == State::Calibrated && status.motor == MotorSign::Checked)?;
+    state[0] = world.bench.state()[0];
+    world.hand.hold_in(&state);
+    world.run(ticks(rig, STILL_S), &mut [])?;
+    Ok(world)
 }
 
-impl<'t> Shaken<'t> {
-    /// Runs from power-up to the tick in which the firmware begins to shake the machine.
-    ///
-    /// # Errors
-    /// [`ShakeError`] if the firmware does not run, or refuses.
-    pub fn begin(
-        rig: &Rig,
-        table: &TableValues,
-        target: &'t mut dyn Target,
-        duration_s: f64,
-        seed: u64,
-    ) -> Result<Self, ShakeError> {
-        let feed = Feed::new(rig, table, duration_s, seed)?;
-        Ok(Self::begin_with(feed, rig, table, target, seed)?)
-    }
+/// A host that has the firmware shake its machine: sends the forces and takes the log.
+pub struct ShakingHost {
+    feed: Feed,
+    recorder: Recorder,
+    /// Why it has given up.
+    failed: Option<IdentifyError>,
+}
 
-    /// As [`begin`](Self::begin), with forces that were computed before.
+impl ShakingHost {
+    /// Asks the firmware of a machine that is [checked and hangs](checked_and_hanging) to shake it, and has the hand let
+    /// go in the first tick.
     ///
     /// # Errors
-    /// [`HarnessError`] if the firmware does not run, or refuses.
-    pub fn begin_with(
+    /// [`HarnessError`] if the firmware refuses.
+    pub fn begin(
         feed: Feed,
         rig: &Rig,
         table: &TableValues,
-        target: &'t mut dyn Target,
-        seed: u64,
+        world: &mut World<'_>,
     ) -> Result<Self, HarnessError> {
-        let mut harness = checked_and_hanging(rig, table, target, seed)?;
-        let inputs = harness.inputs();
+        let inputs = world.inputs();
         // The line of a board has room for the log and a little telemetry. Of a drive with pulses, only telemetry says
         // whether it shakes the cart or holds it.
         let telemetry_ticks = if table.drive.pulses().is_some() { 1 } else { ticks(rig, TELEMETRY_S) as u16 };
-        harness.session.ask(Request::Telemetry(telemetry_ticks), &inputs)?;
-        harness.session.ask(Request::Log(true), &inputs)?;
-        harness.session.ask(feed.begin(), &inputs)?;
-        Ok(Self { harness, feed, recorder: Recorder::new(rig, table) })
+        world.session.ask(Request::Telemetry(telemetry_ticks), &inputs)?;
+        world.session.ask(Request::Log(true), &inputs)?;
+        world.session.ask(feed.begin(), &inputs)?;
+        let mut host = Self { feed, recorder: Recorder::new(rig, table), failed: None };
+        world.run(1, &mut [&mut host])?;
+        world.let_go();
+        Ok(host)
     }
 
-    /// One tick of firmware and machine: `pins` may change what the firmware reads, `motor` what drives the cart while
-    /// the motor is on.
-    ///
-    /// # Errors
-    /// [`ShakeError`] if the firmware does not answer, or the cart does not follow the pulses.
-    pub fn tick(
-        &mut self,
-        pins: impl FnOnce(&mut Pins),
-        motor: impl FnOnce(Drive) -> Drive,
-    ) -> Result<Output, ShakeError> {
-        let mut inputs = self.harness.inputs();
-        pins(&mut inputs);
-        let output = self.act(&inputs, motor)?;
-        self.feed()?;
-        Ok(output)
-    }
-
-    /// One tick without the host: the log is not read, and no forces are sent.
-    ///
-    /// # Errors
-    /// [`HarnessError`] if the firmware does not answer.
-    pub fn act(&mut self, inputs: &Pins, motor: impl FnOnce(Drive) -> Drive) -> Result<Output, HarnessError> {
-        let session = &mut self.harness.session;
-        while session.next_reply().is_some() || session.next_telemetry().is_some() {}
-        let output = session.tick(inputs)?;
-        // A motor that is off turns freely.
-        self.harness.bench.tick(if output.enable { motor(output.drive) } else { Drive::Force(0.0) });
-        Ok(output)
-    }
-
-    /// The host's part of a tick: takes the log and sends the forces that are due.
+    /// Takes the log, and sends the forces that are due.
     ///
     /// # Errors
     /// [`IdentifyError`] if the cart does not follow the pulses.
-    pub fn feed(&mut self) -> Result<(), IdentifyError> {
-        while let Some(message) = self.harness.session.next_log() {
+    pub fn feed(&mut self, session: &mut Session<'_>) -> Result<(), IdentifyError> {
+        while let Some(message) = session.next_log() {
             self.recorder.push(&message);
             if let Some(last) = self.recorder.log().ticks().last().filter(|_| !self.feed.has_begun()) {
                 self.feed.begun(last.number);
             }
         }
         for request in self.feed.due(self.recorder.log())? {
-            self.harness.session.send(request);
+            session.send(request);
         }
         Ok(())
     }
 
     /// Whether all forces have been applied and logged, and the motor is off.
-    pub fn is_over(&self) -> bool {
-        self.feed.is_over(self.recorder.log()) && self.harness.session.status().state == State::Calibrated
+    pub fn is_over(&self, session: &Session<'_>) -> bool {
+        self.feed.is_over(self.recorder.log()) && session.status().state == State::Calibrated
     }
 
     /// The log so far.
     pub fn log(&self) -> &Log {
         self.recorder.log()
     }
+
+    /// The whole log.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the cart did not follow the pulses, or the firmware has sent no log.
+    pub fn finish(self) -> Result<Log, IdentifyError> {
+        self.failed.map_or_else(|| self.recorder.finish(), Err)
+    }
 }
 
-fn ticks(rig: &Rig, seconds: f64) -> u32 {
-    (seconds / rig.tick.period_s).ceil() as u32
+impl Participant for ShakingHost {
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        self.failed = self.feed(&mut world.session).err();
+        until(self.failed.is_some() || world.session.fault().is_some() || self.is_over(&world.session))
+    }
+}
+
+fn ticks(rig: &Rig, seconds: f64) -> usize {
+    (seconds / rig.tick.period_s).ceil() as usize
 }

@@ -2,13 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use upright::board::Output;
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
-use upright_closed_loop::harness::{Harness, HarnessError, with_firmware};
+use upright_closed_loop::harness::{
+    Flow, Goals, HarnessError, Participant, Pins, World, until, with_firmware,
+};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, Sensing, SimulationError};
+use upright_design::simulate::{Goal, Scenario, Sensing, SimulationError};
 use upright_design::table::{TableValues, gains_source};
 
 /// Ticks of the run with which machines are compared.
@@ -58,10 +61,27 @@ impl Fingerprint {
         rounding: PullRounding,
         ticks: u32,
     ) -> Result<Self, FingerprintError> {
+        let period_s = rig.tick.period_s;
         let ran = with_firmware(table, |firmware| -> Result<Self, HarnessError> {
-            let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(rig, Law::Lqr) };
-            let harness = Harness::new(rig, table, &scenario, firmware)?;
-            run(harness, rig, table, (rounding, ticks))
+            let goals = [(3, Equilibrium::HANGING), (6, Equilibrium::UPRIGHT)]
+                .map(|(tenths, to)| Goal { at_s: f64::from(tenths * ticks / 10) * period_s, to });
+            let scenario = Scenario {
+                sensing: Sensing::Encoders,
+                goals: if table.swing_up.is_some() { goals.to_vec() } else { Vec::new() },
+                ..Scenario::at_rest(rig, Law::Lqr)
+            };
+            let mut world = World::new(rig, table, &scenario, firmware)?;
+            world.raise(None)?;
+            world.goals = Goals::of(rig, &scenario);
+            let (ticks, hash, spent) = (ticks as usize, Sha256::new(), [0; 3]);
+            let mut run = FingerprintRun { table, rounding, period_s, ticks, hash, spent, broken: None };
+            world.run(ticks, &mut [&mut run])?;
+            Ok(Self {
+                table: String::new(),
+                run: Some(hex(&run.hash.finalize())),
+                ticks: run.spent,
+                fault: world.session.fault().map(|fault| fault.to_string()),
+            })
         });
         let mut fingerprint = match ran {
             Err(HarnessError::Simulation(SimulationError::Size { .. })) => Self::default(),
@@ -72,51 +92,54 @@ impl Fingerprint {
     }
 }
 
-fn run(
-    mut harness: Harness<'_>,
-    rig: &Rig,
-    table: &TableValues,
-    (rounding, ticks): (PullRounding, u32),
-) -> Result<Fingerprint, HarnessError> {
-    let mut output = harness.raise(None)?;
-    let goals: Vec<(usize, Equilibrium)> = match &table.swing_up {
-        Some(_) => [(3, Equilibrium::HANGING), (6, Equilibrium::UPRIGHT)]
-            .map(|(tenths, to)| ((tenths * ticks / 10) as usize, to))
-            .to_vec(),
-        None => Vec::new(),
-    };
-    let keep_alive = (KEEP_ALIVE.as_secs_f64() / rig.tick.period_s).max(1.0) as u32;
-    let (mut hash, mut spent, mut broken) = (Sha256::new(), [0; 3], None);
-    for tick in 0..ticks {
-        if !harness.ask_for(tick as usize, &goals) && tick.is_multiple_of(keep_alive) {
-            harness.session.send(Request::KeepAlive);
+/// A run of `ticks` ticks: a host that only keeps the line alive, a pull on the rig, an encoder that breaks, and what
+/// is computed.
+struct FingerprintRun<'a> {
+    table: &'a TableValues,
+    rounding: PullRounding,
+    period_s: f64,
+    ticks: usize,
+    hash: Sha256,
+    spent: [u32; 3],
+    /// What the encoder reads from when it broke.
+    broken: Option<u32>,
+}
+
+impl Participant for FingerprintRun<'_> {
+    fn say(&mut self, world: &World<'_>) -> Option<Request> {
+        let every = (KEEP_ALIVE.as_secs_f64() / self.period_s).max(1.0) as usize;
+        world.ticks().is_multiple_of(every).then_some(Request::KeepAlive)
+    }
+
+    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
+        let pull = pull(world.ticks() as f64 * self.period_s, self.table, self.rounding);
+        match self.table.drive.pulses() {
+            Some(_) => world.bench.pull(0.0, &[pull]),
+            None => world.bench.pull(pull, &[]),
         }
-        let pull = pull(f64::from(tick) * rig.tick.period_s, table, rounding);
-        match table.drive.pulses() {
-            Some(_) => harness.bench.pull(0.0, &[pull]),
-            None => harness.bench.pull(pull, &[]),
-        }
-        harness.bench.tick(output.drive);
-        let mut inputs = harness.inputs();
-        if tick >= ticks - ticks / 10
-            && let Some(last) = inputs.raw_counts.last_mut()
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        if world.ticks() >= self.ticks - self.ticks / 10
+            && let Some(last) = pins.raw_counts.last_mut()
         {
-            *last = *broken.get_or_insert(*last);
+            *last = *self.broken.get_or_insert(*last);
         }
-        output = harness.session.tick(&inputs)?;
-        hash.update(format!("{output:?}"));
-        hash.update(harness.session.last_bytes());
-        harness.bench.state().iter().for_each(|value| hash.update(value.to_bits().to_le_bytes()));
-        match harness.session.status().state {
-            State::Balancing => spent[0] += 1,
-            State::Raising => spent[1] += 1,
-            State::Lowering => spent[2] += 1,
+        Ok(())
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        self.hash.update(format!("{:?}", world.output()));
+        self.hash.update(world.session.last_bytes());
+        world.bench.state().iter().for_each(|value| self.hash.update(value.to_bits().to_le_bytes()));
+        match world.session.status().state {
+            State::Balancing => self.spent[0] += 1,
+            State::Raising => self.spent[1] += 1,
+            State::Lowering => self.spent[2] += 1,
             _ => {}
         }
-        harness.session.forget_received();
+        until(false)
     }
-    let fault = harness.session.fault().map(|fault| fault.to_string());
-    Ok(Fingerprint { table: String::new(), run: Some(hex(&hash.finalize())), ticks: spent, fault })
 }
 
 /// A pull on the cart (N), or on the first joint (N·m) where pulses say where the cart is: three triangular waves,

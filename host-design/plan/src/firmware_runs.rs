@@ -4,6 +4,7 @@ use core::ops::Range;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
@@ -12,7 +13,9 @@ use super::SwingUpError;
 use super::closed_loop::deviation;
 use super::demonstration::{hang, up_and_down};
 use super::robustness::{MotionSpread, RandomRuns, TELEMETRY_TICKS, drawn};
-use upright_closed_loop::harness::{Harness, HarnessError, Target, goals, with_firmware};
+use upright_closed_loop::harness::{
+    Flow, Goals, HarnessError, Participant, Target, World, until, with_firmware,
+};
 use upright_design::motion::{RaiseAndLower, Transition};
 use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
 use upright_design::simulate::Scenario;
@@ -175,9 +178,9 @@ pub fn firmware_runs(
 }
 
 /// The first reason that the firmware gives against raising the links, without its remedy.
-fn why_not_begun(harness: &mut Harness<'_>) -> Result<String, HarnessError> {
-    let inputs = harness.inputs();
-    let reason = match harness.session.ask(Request::Goto(Equilibrium::UPRIGHT), &inputs) {
+fn why_not_begun(world: &mut World<'_>) -> Result<String, HarnessError> {
+    let inputs = world.inputs();
+    let reason = match world.session.ask(Request::Goto(Equilibrium::UPRIGHT), &inputs) {
         Err(HarnessError::Refused { answer: Answer::NotNow(inhibits), .. }) => inhibits.texts().next(),
         answer => answer.map(|_| None)?,
     };
@@ -192,49 +195,58 @@ fn raised_and_lowered(
     scenario: &Scenario,
     target: &mut dyn Target,
 ) -> Result<Reached, HarnessError> {
-    let ticks = |seconds: f64| (seconds / rig.tick.period_s).round() as usize;
-    let goals = goals(scenario, rig.tick.period_s);
-    let Some(&(lower_at, _)) = goals.first() else { return Ok(Reached::default()) };
-    let mut harness = Harness::new(rig, table, scenario, target)?;
-    let mut reached = Reached::default();
-    let mut output = match harness.raise(None) {
+    let goals = Goals::of(rig, scenario);
+    let Some(lower_at) = goals.tick_of(0) else { return Ok(Reached::default()) };
+    let mut world = World::new(rig, table, scenario, target)?;
+    match world.raise(None) {
         Err(HarnessError::NotBalancing(_)) => {
             // A fault in the first ticks of the motion is none of the reasons against a command.
-            reached.fault = harness.session.fault().map(|fault| fault.to_string());
-            if reached.fault.is_none() {
-                reached.refused = Some(why_not_begun(&mut harness)?);
-            }
-            return Ok(reached);
+            let fault = world.session.fault().map(|fault| fault.to_string());
+            let refused = if fault.is_some() { None } else { Some(why_not_begun(&mut world)?) };
+            return Ok(Reached { fault, refused, ..Reached::default() });
         }
-        output => output?,
+        raised => raised?,
     };
-    harness.session.send(Request::Telemetry(TELEMETRY_TICKS));
-    let last = ticks(scenario.duration_s);
-    let mut tick = 0;
-    while tick <= last + harness.begun().first().map_or(0, |from| from - lower_at) {
-        if tick > 0 {
-            let inputs = harness.inputs();
-            output = harness.session.tick(&inputs)?;
+    world.goals = goals;
+    world.session.send(Request::Telemetry(TELEMETRY_TICKS));
+    let last = (scenario.duration_s / rig.tick.period_s).round() as usize;
+    let mut watched = UpAndDown { motions, lower_at, last, reached: Reached::default() };
+    world.run(usize::MAX, &mut [&mut watched])?;
+    let mut reached = watched.reached;
+    reached.hung &= hang(world.bench.state());
+    Ok(reached)
+}
+
+/// Watches a rig that is raised and lowered, until it should hang.
+struct UpAndDown<'a> {
+    motions: &'a RaiseAndLower,
+    /// Tick from which it is told to lower the links.
+    lower_at: usize,
+    /// The last tick, if it begins to lower them at once.
+    last: usize,
+    reached: Reached,
+}
+
+impl Participant for UpAndDown<'_> {
+    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
+        let (tick, state, reached) = (world.ticks(), world.session.status().state, &mut self.reached);
+        if tick == self.lower_at {
+            reached.arrived = state == State::Balancing;
         }
-        if tick == lower_at {
-            reached.arrived = harness.session.status().state == State::Balancing;
-        }
-        harness.ask_for(tick, &goals);
-        let moves = [(&motions.raise, Some(0)), (&motions.lower, harness.begun().first().copied())];
+        let lowered = world.goals.begun().first().copied();
+        let moves = [(&self.motions.raise, Some(0)), (&self.motions.lower, lowered)];
         for ((motion, begin), largest) in moves.into_iter().zip(&mut reached.deviation_rad) {
             let planned = begin.and_then(|begin| motion.x.get(tick.checked_sub(begin)?));
             if let Some(planned) = planned {
-                largest.0 = largest.0.max(deviation(harness.bench.state(), planned));
+                largest.0 = largest.0.max(deviation(world.bench.state(), planned));
             }
         }
-        harness.bench.tick(output.drive);
-        while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
-        tick += 1;
+        reached.fault = world.session.fault().map(|fault| fault.to_string());
+        reached.hung = reached.arrived && reached.fault.is_none() && state == State::Calibrated;
     }
-    reached.fault = harness.session.fault().map(|fault| fault.to_string());
-    reached.hung = reached.arrived
-        && reached.fault.is_none()
-        && harness.session.status().state == State::Calibrated
-        && hang(harness.bench.state());
-    Ok(reached)
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        let late = world.goals.begun().first().map_or(0, |from| from - self.lower_at);
+        until(world.ticks() > self.last + late)
+    }
 }

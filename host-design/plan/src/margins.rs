@@ -1,6 +1,7 @@
 //! How far each link may be pushed at each moment of a motion.
 
 use serde::Serialize;
+use upright::board::Output;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
@@ -8,7 +9,9 @@ use upright::table::Equilibrium;
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
 use super::robustness::TELEMETRY_TICKS;
-use upright_closed_loop::harness::{Harness, HarnessError, Target, goals, with_firmware};
+use upright_closed_loop::harness::{
+    Flow, Goals, HarnessError, Participant, Target, World, until, with_firmware,
+};
 use upright_design::motion::Transition;
 use upright_design::parallel;
 use upright_design::plant::absolute_angles;
@@ -150,41 +153,68 @@ fn arrival(
     target: &mut dyn Target,
 ) -> Result<Option<usize>, HarnessError> {
     let in_ticks = |seconds: f64| (seconds / rig.tick.period_s).round() as usize;
-    let mut harness = Harness::new(rig, table, scenario, target)?;
-    let mut output = harness.raise(None)?;
-    harness.session.send(Request::Telemetry(TELEMETRY_TICKS));
-    let (transition, goals) = match scenario.begin {
-        Begin::Hanging => (Transition::Up, Vec::new()),
-        Begin::ByHand => (Transition::Down, goals(scenario, rig.tick.period_s)),
+    let mut world = World::new(rig, table, scenario, target)?;
+    world.raise(None)?;
+    world.session.send(Request::Telemetry(TELEMETRY_TICKS));
+    let transition = match scenario.begin {
+        Begin::Hanging => Transition::Up,
+        Begin::ByHand => {
+            world.goals = Goals::of(rig, scenario);
+            Transition::Down
+        }
     };
-    let ticks = motion_ticks(table, transition);
-    let mut tick = 0;
-    loop {
-        let begin = if transition == Transition::Up { Some(0) } else { harness.begun().first().copied() };
-        let latest = goals.first().map(|(at, _)| at + in_ticks(LONGEST_WAIT_S));
-        let Some(end) = begin.map(|begin| begin + ticks).or(latest) else {
-            return Ok(None);
+    let in_motion = motion_ticks(table, transition);
+    let [latest, after, pushing] = [LONGEST_WAIT_S, AFTER_S, PUSH_S].map(in_ticks);
+    let is_over = false;
+    let mut pushed =
+        Pushed { rig, push, transition, in_motion, latest, after, pushing, arrived: None, is_over };
+    world.run(usize::MAX, &mut [&mut pushed])?;
+    Ok(pushed.arrived)
+}
+
+/// Pushes a rig in its motion, and watches whether it arrives.
+struct Pushed<'a> {
+    rig: &'a Rig,
+    push: Option<Push>,
+    transition: Transition,
+    /// Ticks of the motion.
+    in_motion: usize,
+    /// Ticks from the request within which the motion begins, after the motion, and of the push.
+    latest: usize,
+    after: usize,
+    pushing: usize,
+    /// The tick in which the motion began, if it has arrived.
+    arrived: Option<usize>,
+    is_over: bool,
+}
+
+impl Participant for Pushed<'_> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        let (tick, is_up) = (world.ticks(), self.transition == Transition::Up);
+        let begin = if is_up { Some(0) } else { world.goals.begun().first().copied() };
+        let latest = world.goals.tick_of(0).map(|at| at + self.latest);
+        let end = begin.map(|begin| begin + self.in_motion).or(latest);
+        let Some(end) = end.filter(|end| output.enable || !(is_up || tick < *end)) else {
+            self.is_over = true;
+            return;
         };
-        if !output.enable && (transition == Transition::Up || tick < end) {
-            return Ok(None);
-        }
-        if tick == end + in_ticks(AFTER_S) {
-            let is_well = match transition {
-                Transition::Up => harness.session.status().state == State::Balancing,
-                _ => harness.session.status().state == State::Calibrated && hang(harness.bench.state()),
+        if tick == end + self.after {
+            let state = world.session.status().state;
+            let is_well = match self.transition {
+                Transition::Up => state == State::Balancing,
+                _ => state == State::Calibrated && hang(world.bench.state()),
             };
-            return Ok(begin.filter(|_| is_well && harness.session.fault().is_none()));
+            self.arrived = begin.filter(|_| is_well && world.session.fault().is_none());
+            self.is_over = true;
         }
-        harness.ask_for(tick, &goals);
-        if let Some(push) = push.filter(|push| (push.tick..push.tick + in_ticks(PUSH_S)).contains(&tick)) {
-            let (force_n, torques_n_m) = push.on(rig, harness.bench.state());
-            harness.bench.pull(force_n, &torques_n_m);
+        if let Some(push) = self.push.filter(|push| (push.tick..push.tick + self.pushing).contains(&tick)) {
+            let (force_n, torques_n_m) = push.on(self.rig, world.bench.state());
+            world.bench.pull(force_n, &torques_n_m);
         }
-        harness.bench.tick(output.drive);
-        while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
-        let inputs = harness.inputs();
-        output = harness.session.tick(&inputs)?;
-        tick += 1;
+    }
+
+    fn saw(&mut self, _: &mut World<'_>) -> Flow {
+        until(self.is_over)
     }
 }
 

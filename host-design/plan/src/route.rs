@@ -1,13 +1,16 @@
 //! Routes: all motions of a table, one after the other, by the whole firmware.
 
 use serde::{Deserialize, Serialize};
+use upright::board::Output;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{MotionSpread, TELEMETRY_TICKS, drawn};
-use upright_closed_loop::harness::{Harness, HarnessError, Target, goals, with_firmware};
+use upright_closed_loop::harness::{
+    Flow, Goals, HarnessError, Participant, Target, World, until, with_firmware,
+};
 use upright_design::motion::{Transition, rest};
 use upright_design::plant::{absolute_angles, without_turns};
 use upright_design::rig::Rig;
@@ -236,39 +239,49 @@ fn along_route(
     scenario: &Scenario,
     target: &mut dyn Target,
 ) -> Result<RouteRun, HarnessError> {
-    let mut run = RouteRun::default();
-    let goals = goals(scenario, rig.tick.period_s);
-    let mut harness = Harness::new(rig, table, scenario, target)?;
-    let mut output = harness.raise(None)?;
-    harness.session.send(Request::Telemetry(TELEMETRY_TICKS));
+    let mut world = World::new(rig, table, scenario, target)?;
+    world.raise(None)?;
+    world.goals = Goals::of(rig, scenario);
+    world.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = (route.duration_s / rig.tick.period_s) as usize;
-    for tick in 0..=last {
-        if tick > 0 {
-            let inputs = harness.inputs();
-            output = harness.session.tick(&inputs)?;
-        }
-        harness.ask_for(tick, &goals);
-        let ends = goals.get(run.arrived).map_or(last, |(at, _)| *at);
-        if tick + 1 >= ends && run.arrived < route.transitions.len() {
-            if !has_arrived(&harness, route, run.arrived) {
-                break;
-            }
-            run.arrived += 1;
-        }
-        harness.bench.tick(output.drive);
-        while harness.session.next_telemetry().is_some() || harness.session.next_reply().is_some() {}
-    }
-    run.fault = harness.session.fault().map(|fault| fault.to_string());
-    Ok(run)
+    let mut watched = OnRoute { route, last, run: RouteRun::default(), is_lost: false };
+    world.run(last + 1, &mut [&mut watched])?;
+    Ok(watched.run)
 }
 
-/// Whether motion `index` of the route has begun and ended where it should.
-fn has_arrived(harness: &Harness<'_>, route: &Route, index: usize) -> bool {
-    let transition = route.transitions[index];
-    let [_, after] = states(transition, route.links);
-    harness.begun().len() >= index
-        && harness.session.status().state == after
-        && is_near(harness.bench.state(), transition.to(route.links))
+/// Watches a rig on its route, until a motion does not arrive.
+struct OnRoute<'a> {
+    route: &'a Route,
+    last: usize,
+    run: RouteRun,
+    is_lost: bool,
+}
+
+impl OnRoute<'_> {
+    /// Whether motion `index` of the route has begun and ended where it should.
+    fn has_arrived(&self, world: &World<'_>, index: usize) -> bool {
+        let transition = self.route.transitions[index];
+        let [_, after] = states(transition, self.route.links);
+        world.goals.begun().len() >= index
+            && world.session.status().state == after
+            && is_near(world.bench.state(), transition.to(self.route.links))
+    }
+}
+
+impl Participant for OnRoute<'_> {
+    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
+        let arrived = self.run.arrived;
+        let ends = world.goals.tick_of(arrived).unwrap_or(self.last);
+        if world.ticks() + 1 >= ends && arrived < self.route.transitions.len() {
+            self.is_lost = !self.has_arrived(world, arrived);
+            self.run.arrived += usize::from(!self.is_lost);
+        }
+        self.run.fault = world.session.fault().map(|fault| fault.to_string());
+    }
+
+    fn saw(&mut self, _: &mut World<'_>) -> Flow {
+        until(self.is_lost)
+    }
 }
 
 /// Whether all links are near `at`, apart from whole turns.

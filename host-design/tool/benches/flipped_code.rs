@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use upright::control::actuator::Drive;
 use upright::table::Law;
 use upright_board::{Conditions, Image, Input};
-use upright_closed_loop::harness::{Harness, HarnessError};
+use upright_closed_loop::harness::{HarnessError, World};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
@@ -34,8 +34,8 @@ fn balanced(rig: &Rig, table: &TableValues, image: &Image, flip: Option<(usize, 
         Scenario { sensing: Sensing::Encoders, force_noise_n: 0.1, ..Scenario::at_rest(rig, Law::Lqr) };
     let mut board = VirtualBoard::start(image, &Conditions::f405(1), table).unwrap();
     let events = board.events();
-    let mut harness = Harness::new(rig, table, &scenario, &mut board).unwrap();
-    let mut output = harness.raise(None).unwrap();
+    let mut world = World::new(rig, table, &scenario, &mut board).unwrap();
+    let mut output = world.raise(None).unwrap();
     let mut ticks = Vec::new();
     for tick in 0..FLIPS.end + LONGEST + 1 {
         if let Some((at, address, bit)) = flip
@@ -44,16 +44,16 @@ fn balanced(rig: &Rig, table: &TableValues, image: &Image, flip: Option<(usize, 
             let input = Input::FlipBit { address, bit };
             events.borrow_mut().push(Event::Input { after: upright_board::seconds(2e-4), input });
         }
-        harness.bench.tick(output.drive);
-        let inputs = harness.inputs();
-        output = match harness.session.tick(&inputs) {
+        world.bench.tick(output.drive);
+        let inputs = world.inputs();
+        output = match world.session.tick(&inputs) {
             Ok(output) if output.enable => output,
             // The motor is off, or the board does what the hardware does not allow, which ends the run.
             Ok(_) | Err(HarnessError::Board(_)) => break,
             Err(error) => panic!("{error}"),
         };
         let Drive::Force(force_n) = output.drive else { panic!("{:?}", output.drive) };
-        let angles = harness.bench.state().iter().skip(2).step_by(2);
+        let angles = world.bench.state().iter().skip(2).step_by(2);
         ticks.push((force_n, angles.fold(0.0f64, |most, angle| most.max(angle.abs()))));
     }
     ticks

@@ -9,7 +9,7 @@ use upright::protocol::message::Request;
 use upright::protocol::simulated_pins::{MAX_PINS_IN, MAX_PINS_OUT, PinsOut};
 use upright::supervision::supervisor::State;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, HarnessError, Pace, Pins, Target, record, with_firmware};
+use upright_closed_loop::harness::{HarnessError, Pace, Pins, Target, World, record, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -115,18 +115,18 @@ fn at_rest(rig: &'static str) -> Replay {
 
 /// Balances, and then nothing moves any more.
 pub(crate) fn stand_still(rig: &Rig, table: &TableValues, target: &mut dyn Target) {
-    let mut harness = Harness::new(rig, table, &Scenario::at_rest(rig, Law::Lqr), target).unwrap();
-    harness.raise(Some(0.0)).unwrap();
-    let still = harness.inputs();
+    let mut world = World::new(rig, table, &Scenario::at_rest(rig, Law::Lqr), target).unwrap();
+    world.raise(Some(0.0)).unwrap();
+    let still = world.inputs();
     for tick in 0..REST_TICKS {
         let mut pins = still.clone();
         if tick == KICK {
             pins.raw_counts[1] = pins.raw_counts[1].wrapping_add(1) & 0xffff;
         }
         if tick.is_multiple_of(50) {
-            harness.session.send(Request::KeepAlive);
+            world.session.send(Request::KeepAlive);
         }
-        harness.session.tick(&pins).unwrap();
+        world.session.tick(&pins).unwrap();
     }
-    assert_eq!((harness.session.status().state, harness.session.fault()), (State::Balancing, None));
+    assert_eq!((world.session.status().state, world.session.fault()), (State::Balancing, None));
 }

@@ -3,7 +3,7 @@
 use upright::board::Output;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Cause;
-use upright_closed_loop::harness::{Harness, HarnessError, with_firmware};
+use upright_closed_loop::harness::{HarnessError, World, with_firmware};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -21,30 +21,30 @@ pub(crate) fn balancing<R>(
     rig: &Rig,
     values: &TableValues,
     scenario: &Scenario,
-    test: impl FnOnce(&mut Harness<'_>) -> R,
+    test: impl FnOnce(&mut World<'_>) -> R,
 ) -> Result<R, HarnessError> {
     with_firmware(values, |target| {
-        let mut harness = Harness::new(rig, values, scenario, target)?;
-        let output = harness.raise(None)?;
-        harness.bench.tick(output.drive);
-        Ok(test(&mut harness))
+        let mut world = World::new(rig, values, scenario, target)?;
+        let output = world.raise(None)?;
+        world.bench.tick(output.drive);
+        Ok(test(&mut world))
     })?
 }
 
 /// One tick of firmware and rig.
-pub(crate) fn tick(harness: &mut Harness<'_>) -> Output {
-    let inputs = harness.inputs();
-    let output = harness.session.tick(&inputs).unwrap();
-    harness.bench.tick(output.drive);
+pub(crate) fn tick(world: &mut World<'_>) -> Output {
+    let inputs = world.inputs();
+    let output = world.session.tick(&inputs).unwrap();
+    world.bench.tick(output.drive);
     output
 }
 
 /// Sends a request and runs firmware and rig until the answer arrives.
-pub(crate) fn ask(harness: &mut Harness<'_>, request: Request) -> Answer {
-    let id = harness.session.send(request);
+pub(crate) fn ask(world: &mut World<'_>, request: Request) -> Answer {
+    let id = world.session.send(request);
     for _ in 0..3 {
-        tick(harness);
-        while let Some((answered, answer)) = harness.session.next_reply() {
+        tick(world);
+        while let Some((answered, answer)) = world.session.next_reply() {
             if answered == id {
                 return answer;
             }
@@ -54,16 +54,16 @@ pub(crate) fn ask(harness: &mut Harness<'_>, request: Request) -> Answer {
 }
 
 /// The first cause of the fault.
-pub(crate) fn cause(harness: &mut Harness<'_>) -> Option<Cause> {
-    match ask(harness, Request::Cause) {
+pub(crate) fn cause(world: &mut World<'_>) -> Option<Cause> {
+    match ask(world, Request::Cause) {
         Answer::Cause(cause) => cause,
         other => panic!("{other:?}"),
     }
 }
 
 /// Number of measurements that the firmware has rejected so far.
-pub(crate) fn rejected(harness: &mut Harness<'_>) -> u32 {
-    match ask(harness, Request::Statistics) {
+pub(crate) fn rejected(world: &mut World<'_>) -> u32 {
+    match ask(world, Request::Statistics) {
         Answer::Statistics(statistics) => statistics.rejected_samples,
         other => panic!("{other:?}"),
     }

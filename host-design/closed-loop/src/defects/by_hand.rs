@@ -1,9 +1,9 @@
 //! A defect that a person starts while the rig runs.
 
-use crate::harness::{Pins, Session};
+use crate::harness::{HarnessError, Participant, Pins, World};
 use upright::board::Output;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Scenario, StepDefect};
+use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 
 use super::defect::{Defect, Needs};
@@ -12,11 +12,13 @@ use super::expected::Phase;
 use super::injection::Injection;
 use super::trial::{Trial, able, first_encoder};
 
-/// A defect in a running rig, injected tick by tick.
+/// A defect in a running rig, tick by tick.
 pub struct Defective<'a> {
     injection: Injection<'a>,
     kind: Defect,
-    since: usize,
+    /// The firmware's tick in which it begins, as [`World::ticks`] counts them after that tick.
+    onset: Option<usize>,
+    is_visible: bool,
 }
 
 impl Defect {
@@ -76,10 +78,11 @@ impl Trial {
 }
 
 impl<'a> Defective<'a> {
-    /// The defect of `trial`, which begins with the next tick.
-    pub fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
+    /// The defect of `trial`, which begins in the firmware's tick `onset`; without one, not before
+    /// [`begin_in`](Self::begin_in).
+    pub fn new(rig: &Rig, table: &'a TableValues, trial: Trial, onset: Option<usize>) -> Self {
         let kind = trial.kind;
-        Self { injection: Injection::new(rig, table, trial), kind, since: 0 }
+        Self { injection: Injection::new(rig, table, trial), kind, onset, is_visible: false }
     }
 
     /// The kind of the defect.
@@ -87,37 +90,63 @@ impl<'a> Defective<'a> {
         self.kind
     }
 
-    /// Injects what happens only once: bytes on the serial line, or a fault inside the microcontroller.
-    pub fn begin(&mut self, session: &mut Session<'_>) {
-        self.injection.serial(session);
-        if let Some(injected_fault) = self.kind.inside_the_microcontroller() {
-            session.injected_fault(injected_fault);
-        }
+    /// Lets it begin in this tick of the firmware.
+    pub fn begin_in(&mut self, tick: usize) {
+        self.onset = Some(tick);
+    }
+
+    /// Number of ticks since the onset in this tick of the firmware; none before.
+    pub fn since(&self, tick: usize) -> Option<usize> {
+        tick.checked_sub(self.onset?)
     }
 
     /// Whether the host still sends keep-alives.
-    pub fn host_is_alive(&self) -> bool {
-        self.injection.host_is_alive(Some(self.since))
+    pub fn host_is_alive(&self, tick: usize) -> bool {
+        self.injection.host_is_alive(self.since(tick))
     }
 
-    /// Changes what the firmware reads in the next tick.
-    pub fn inputs(&mut self, inputs: &mut Pins) {
-        self.injection.inputs(self.since, inputs);
-        self.since += 1;
+    /// External force in this tick (N): on the cart, or on the first link of a rig whose cart goes where its pulses
+    /// say.
+    pub fn push_n(&self, tick: usize) -> f64 {
+        self.since(tick).map_or(0.0, |since| self.injection.push_n(since))
     }
 
-    /// Changes the output to the motor.
-    pub fn output(&mut self, output: &mut Output) {
-        self.injection.output(self.since, output);
+    /// Whether what the firmware has read in the last tick, or its motor by now, differs visibly from that of a healthy
+    /// rig.
+    pub fn is_visible(&self) -> bool {
+        self.is_visible
+    }
+}
+
+impl Participant for Defective<'_> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        let Some(since) = self.since(world.ticks()) else { return };
+        if since == 0 {
+            self.injection.serial(&mut world.session);
+            self.is_visible |= self.kind == Defect::TableBit;
+        }
+        if let Some(defect) = self.injection.step_defect(since) {
+            world.bench.spoil(defect);
+        }
+        let drive = output.drive;
+        self.is_visible |= self.injection.output(since, output);
+        if !output.enable {
+            // No defect drives a motor that is off: it turns freely.
+            output.drive = drive;
+        }
     }
 
-    /// What is wrong in this tick with a drive that takes pulses.
-    pub fn step_defect(&self) -> Option<StepDefect> {
-        self.injection.step_defect(self.since)
-    }
-
-    /// External force on the cart, or on the first link of a rig whose cart goes where its pulses say (N).
-    pub fn push_n(&self) -> f64 {
-        self.injection.push_n(self.since)
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        let Some(since) = self.since(world.ticks() + 1) else { return Ok(()) };
+        self.is_visible = self.injection.inputs(since, pins);
+        if since == 0 {
+            if let Some(fault) = self.kind.inside_the_microcontroller() {
+                world.session.injected_fault(fault);
+            }
+            if self.kind == Defect::HostDeaf {
+                world.session.stop_reading()?;
+            }
+        }
+        Ok(())
     }
 }

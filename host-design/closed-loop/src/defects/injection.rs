@@ -31,7 +31,7 @@ const LONGEST_LATENESS: usize = 20;
 type Counters = heapless::Vec<u32, MAX_SENSORS>;
 
 /// The defect of a trial, tick by tick.
-pub struct Injection<'a> {
+pub(super) struct Injection<'a> {
     trial: Trial,
     table: &'a TableValues,
     random: Pcg64,
@@ -100,7 +100,7 @@ fn every(size: f64) -> usize {
 
 impl<'a> Injection<'a> {
     /// The defect of `trial` in a rig with this table.
-    pub fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
+    pub(super) fn new(rig: &Rig, table: &'a TableValues, trial: Trial) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
         let thresholds = match (&table.swing_up, trial.phase) {
             (None, _) | (_, Phase::Balancing | Phase::Jogging | Phase::Shaken) => &table.thresholds,
@@ -130,13 +130,13 @@ impl<'a> Injection<'a> {
     }
 
     /// Whether the host still sends keep-alives, `since` ticks after the onset.
-    pub fn host_is_alive(&self, since: Option<usize>) -> bool {
+    pub(super) fn host_is_alive(&self, since: Option<usize>) -> bool {
         self.trial.kind != Defect::HostSilent || since.is_none()
     }
 
     /// Changes what the firmware reads, `since` ticks after the onset; returns whether it differs visibly from a
     /// healthy rig.
-    pub fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
+    pub(super) fn inputs(&mut self, since: usize, inputs: &mut Pins) -> bool {
         let Trial { kind, sensor, sign, size, .. } = self.trial;
         let truth = inputs.raw_counts.clone();
         let began = self.at_onset.get_or_insert_with(|| truth.clone()).clone();
@@ -234,7 +234,7 @@ impl<'a> Injection<'a> {
 
     /// Changes the output to the motor, `since` ticks after the onset; returns whether the effect by now differs
     /// visibly from a healthy rig.
-    pub fn output(&mut self, since: usize, output: &mut Output) -> bool {
+    pub(super) fn output(&mut self, since: usize, output: &mut Output) -> bool {
         if let Drive::Steps(pulses) = output.drive {
             return self.misses(pulses, since);
         }
@@ -260,7 +260,7 @@ impl<'a> Injection<'a> {
     }
 
     /// What is wrong, `since` ticks after the onset, with a drive that takes pulses.
-    pub fn step_defect(&self, since: usize) -> Option<StepDefect> {
+    pub(super) fn step_defect(&self, since: usize) -> Option<StepDefect> {
         let Trial { kind, size, .. } = self.trial;
         self.table.drive.pulses()?;
         match kind {
@@ -293,13 +293,13 @@ impl<'a> Injection<'a> {
     }
 
     /// External force (N): on the cart, or on the first link of a rig whose cart goes where its pulses say.
-    pub fn push_n(&self, since: usize) -> f64 {
+    pub(super) fn push_n(&self, since: usize) -> f64 {
         let pushes = self.trial.kind == Defect::Push && since < self.push_ticks;
         if pushes { self.trial.sign * self.trial.size * self.full_force_n } else { 0.0 }
     }
 
     /// Sends what the defect sends over the serial line, at the onset.
-    pub fn serial(&mut self, session: &mut Session<'_>) {
+    pub(super) fn serial(&mut self, session: &mut Session<'_>) {
         let Trial { kind, sign, size, .. } = self.trial;
         let disarm = |id: u64| command_frame(&Command { id, request: Request::Disarm });
         let mut next = disarm(session.last_id() + 1);

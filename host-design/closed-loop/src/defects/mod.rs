@@ -21,5 +21,5 @@ pub use by_hand::Defective;
 pub use defect::{Defect, Needs};
 pub use expected::{Expected, Phase, Ticks};
 pub use in_phase::SHAKEN_S;
-pub use injection::{Injection, push_limit_n};
+pub use injection::push_limit_n;
 pub use trial::Trial;

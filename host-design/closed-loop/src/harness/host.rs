@@ -3,6 +3,7 @@
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 
+use super::world::{Participant, World};
 use upright_design::simulate::Scenario;
 
 /// A host that commands the set-point of a scenario and, while it stands still, says that it is still there.
@@ -21,9 +22,11 @@ impl<'a> Host<'a> {
         let keep_alive_ticks = (KEEP_ALIVE.as_secs_f64() / period_s).max(1.0) as usize;
         Self { scenario, period_s, command_ticks, keep_alive_ticks, commanded_m: scenario.target_m(0.0) }
     }
+}
 
-    /// What is sent in this tick.
-    pub fn request(&mut self, tick: usize) -> Option<Request> {
+impl Participant for Host<'_> {
+    fn say(&mut self, world: &World<'_>) -> Option<Request> {
+        let tick = world.ticks();
         let ahead_m = self.scenario.target_m((tick + self.command_ticks) as f64 * self.period_s);
         if ahead_m != self.commanded_m {
             self.commanded_m = ahead_m;

@@ -4,6 +4,10 @@ use upright::board::Contacts;
 
 use upright_design::rig::{PlantDescription, Rig};
 
+use super::error::HarnessError;
+use super::target::Pins;
+use super::world::{Participant, World};
+
 /// Distance from a limit switch to the end stop behind it (m).
 const OVERTRAVEL_M: f64 = 0.01;
 /// How far a person pushes the cart into a switch (m).
@@ -50,6 +54,13 @@ impl RailEnds {
 
     fn beyond(&self, by_m: f64) -> [f64; 2] {
         [self.travel_m[0] - by_m, self.travel_m[1] + by_m]
+    }
+}
+
+impl Participant for RailEnds {
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        self.press(world.bench.state()[0], &mut pins.contacts);
+        Ok(())
     }
 }
 

@@ -5,13 +5,13 @@ use std::collections::VecDeque;
 use upright::board::Output;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
-use upright::table::Equilibrium;
 
 use super::error::HarnessError;
+use super::goals::Goals;
 use super::host::Host;
 use super::session::Session;
-use super::start_up::Harness;
 use super::target::{Pace, Target};
+use super::world::{Flow, Participant, World, until};
 use crate::client::AnyTelemetry;
 use upright_design::plant::without_turns;
 use upright_design::rig::Rig;
@@ -57,54 +57,23 @@ pub fn record(
     scenario: &Scenario,
     target: &mut dyn Target,
 ) -> Result<Recording, HarnessError> {
-    let period_s = rig.tick.period_s;
     let pace = target.pace();
-    check(scenario, period_s, pace)?;
-    let mut harness = Harness::new(rig, table, scenario, target)?;
-    let target_at = |tick: usize| scenario.target_m(tick as f64 * period_s);
-    let mut output = harness.raise(Some(target_at(0) as f32))?;
+    check(scenario, rig.tick.period_s, pace)?;
+    let mut world = World::new(rig, table, scenario, target)?;
+    world.raise(Some(scenario.target_m(0.0) as f32))?;
+    world.goals = Goals::of(rig, scenario);
     let last = ticks(rig, scenario)?;
-    let mut record = RunRecord::new(rig, last, pace.telemetry_ticks.into());
-    let goals = goals(scenario, period_s);
-    let mut host = Host::new(scenario, period_s, pace.command_ticks);
-    for tick in 0..=last {
-        if tick > 0 {
-            let inputs = harness.inputs();
-            output = harness.session.tick(&inputs)?;
-        }
-        // At most one command per tick.
-        if !harness.ask_for(tick, &goals)
-            && let Some(request) = host.request(tick)
-        {
-            harness.session.send(request);
-        }
-        let t = tick as f64 * period_s;
-        // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.
-        let balances = scenario.begin == Begin::ByHand || harness.session.status().state == State::Balancing;
-        let fall = if balances { Fall::of(rig, t, &without_turns(harness.bench.state())) } else { None };
-        let state = harness.bench.state().to_vec();
-        let force = harness.bench.tick(output.drive);
-        let number = harness.session.tick_number();
-        record.pending.push_back(Pending { number, t, target: target_at(tick), state, force, output });
-        record.take(&mut harness.session)?;
-        if fall.is_some() {
-            record.fall = fall;
+    let mut host = Host::new(scenario, rig.tick.period_s, pace.command_ticks);
+    let mut record = RunRecord::new(rig, scenario, last, pace.telemetry_ticks.into());
+    for _ in 0..=last {
+        if world.tick(&mut [&mut host, &mut record])?.is_break() {
             break;
         }
     }
-    if scenario.begin != Begin::ByHand && goals.is_empty() {
-        record.fall = Fall::of(rig, last as f64 * period_s, harness.bench.state());
+    if scenario.begin != Begin::ByHand && scenario.goals.is_empty() {
+        record.fall = Fall::of(rig, last as f64 * rig.tick.period_s, world.bench.state());
     }
-    // The last tick's telemetry may come with the next one.
-    let inputs = harness.inputs();
-    harness.session.tick(&inputs)?;
-    record.take(&mut harness.session)?;
-    Ok(record.finish(rig, scenario))
-}
-
-/// The goals of a scenario, each with the tick from which it is requested.
-pub fn goals(scenario: &Scenario, period_s: f64) -> Vec<(usize, Equilibrium)> {
-    scenario.goals.iter().map(|goal| ((goal.at_s / period_s).round() as usize, goal.to)).collect()
+    Ok(record.finish())
 }
 
 /// Whether the firmware can run this scenario.
@@ -129,7 +98,9 @@ struct Pending {
     output: Output,
 }
 
-struct RunRecord {
+struct RunRecord<'a> {
+    rig: &'a Rig,
+    scenario: &'a Scenario,
     trace: Trace,
     ticks: Vec<FirmwareTick>,
     pending: VecDeque<Pending>,
@@ -142,9 +113,11 @@ struct RunRecord {
     worst_cycles: u32,
 }
 
-impl RunRecord {
-    fn new(rig: &Rig, ticks: usize, telemetry_ticks: u32) -> Self {
+impl<'a> RunRecord<'a> {
+    fn new(rig: &'a Rig, scenario: &'a Scenario, ticks: usize, telemetry_ticks: u32) -> Self {
         Self {
+            rig,
+            scenario,
             trace: Trace::new(rig, ticks),
             ticks: Vec::with_capacity(ticks + 1),
             pending: VecDeque::new(),
@@ -159,7 +132,9 @@ impl RunRecord {
 
     /// Joins the telemetry of each tick with the true state of the bench in that tick.
     fn take(&mut self, session: &mut Session<'_>) -> Result<(), HarnessError> {
-        while let Some(telemetry) = session.next_telemetry() {
+        while !self.pending.is_empty()
+            && let Some(telemetry) = session.next_telemetry()
+        {
             if self.next_tick.is_none() && !telemetry.state.controls() {
                 continue;
             }
@@ -193,14 +168,33 @@ impl RunRecord {
         Ok(())
     }
 
-    fn finish(self, rig: &Rig, scenario: &Scenario) -> Recording {
+    fn finish(self) -> Recording {
         Recording {
-            summary: Summary::of(rig, scenario, &self.trace, self.fall),
+            summary: Summary::of(self.rig, self.scenario, &self.trace, self.fall),
             trace: self.trace,
             ticks: self.ticks,
             fault: self.fault,
             worst_cycles: self.worst_cycles,
         }
+    }
+}
+
+impl Participant for RunRecord<'_> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        let t = world.ticks() as f64 * self.rig.tick.period_s;
+        let state = world.bench.state().to_vec();
+        // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.
+        if self.scenario.begin == Begin::ByHand || world.session.status().state == State::Balancing {
+            self.fall = Fall::of(self.rig, t, &without_turns(&state));
+        }
+        let (number, target) = (world.session.tick_number(), self.scenario.target_m(t));
+        self.pending.push_back(Pending { number, t, target, state, force: 0.0, output: *output });
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        self.pending.back_mut().into_iter().for_each(|tick| tick.force = world.force_n());
+        self.take(&mut world.session)?;
+        until(self.fall.is_some())
     }
 }
 

@@ -15,7 +15,7 @@ use super::console::Console;
 use super::greeting::{breakable, greeting};
 use super::property::Properties;
 use super::request::{MachineRequest, PageRequest};
-use super::simulated::{SimulatedMachine, World};
+use super::simulated::{PoweredMachine, SimulatedMachine};
 use crate::designed::DeskDesign;
 use crate::refusal::{FILE, PageRefusal, failed};
 
@@ -57,7 +57,7 @@ struct Twin {
 
 /// Whether the machine runs.
 enum TwinPower {
-    On(Box<World<'static, 'static>>),
+    On(Box<PoweredMachine<'static, 'static>>),
     /// The firmware has stopped, and why; properties for the next power-up.
     Stopped(String, Box<Properties>),
 }
@@ -194,7 +194,7 @@ impl Twin {
 /// Carries out a request.
 fn heard(
     request: PageRequest,
-    world: &mut World<'static, 'static>,
+    world: &mut PoweredMachine<'static, 'static>,
     console: &mut Console,
 ) -> Result<(), HarnessError> {
     match request {
@@ -218,9 +218,9 @@ fn powered(
     properties: Properties,
     upright: bool,
     epoch: Duration,
-) -> Result<Box<World<'static, 'static>>, HarnessError> {
+) -> Result<Box<PoweredMachine<'static, 'static>>, HarnessError> {
     let target = endless_firmware(machine.table)?;
-    Ok(Box::new(World::new(machine, target, properties, upright, epoch)?))
+    Ok(Box::new(PoweredMachine::new(machine, target, properties, upright, epoch)?))
 }
 
 #[cfg(test)]

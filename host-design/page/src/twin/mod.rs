@@ -4,7 +4,7 @@
 //! | file | what is in it |
 //! |---|---|
 //! | `request.rs`, `greeting.rs`, `console.rs` | what a page asks for, what it is told first, and what it is shown |
-//! | `simulated.rs` | the simulated machine, with `pull.rs`, `holding.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
+//! | `simulated.rs` | the simulated machine, with `pull.rs`, `property.rs`, `challenge.rs`, `pace.rs` |
 //! | `in_page.rs` | the twin of one page, in the page itself |
 //! | `connected.rs` | a real board, whose serial line the page has opened |
 
@@ -12,7 +12,6 @@ mod challenge;
 mod connected;
 mod console;
 mod greeting;
-mod holding;
 mod in_page;
 mod pace;
 mod property;
@@ -25,4 +24,4 @@ pub use greeting::{breakable, greeting};
 pub use in_page::{InPage, TELEMETRY_S};
 pub use property::Properties;
 pub use request::{Holding, MachineRequest, PageRequest};
-pub use simulated::{SimulatedMachine, World};
+pub use simulated::{PoweredMachine, SimulatedMachine};

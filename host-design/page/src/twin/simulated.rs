@@ -5,16 +5,16 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use upright::board::Output;
-use upright::control::actuator::Drive;
+use upright::supervision::sign_check::Signs;
+use upright::supervision::supervisor::State;
 use upright_closed_loop::defects::{Defect, Defective, Trial, push_limit_n};
-use upright_closed_loop::harness::{Harness, HarnessError, Pins, RailEnds, Target};
+use upright_closed_loop::harness::{HarnessError, Participant, Pins, RailEnds, Status, Target, Wish, World};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Bench, Disturbance, Scenario, StepDefect};
 use upright_design::table::TableValues;
 
 use super::challenge::Challenge;
 use super::console::Console;
-use super::holding::ManualHold;
 use super::pace::SimulationPace;
 use super::property::{COARSENESS, DELAY, FORCE_NOISE, Properties};
 use super::pull::{Pull, PulledPoint, Spring};
@@ -35,31 +35,22 @@ pub struct SimulatedMachine<'a> {
 const STOP: [f64; 2] = [0.05, 0.3];
 
 /// A simulated machine under power, and what a person does to it.
-pub struct World<'a, 't> {
+pub struct PoweredMachine<'a, 't> {
     machine: SimulatedMachine<'a>,
     pace: SimulationPace,
-    harness: Harness<'t>,
-    spring: Option<Spring>,
-    pulled: Option<PulledPoint>,
-    pull: Option<Pull>,
-    hold: ManualHold,
+    world: World<'t>,
     properties: Properties,
-    defect: Option<Defective<'a>>,
-    challenge: Option<Challenge>,
-    delayed: VecDeque<Output>,
-    output: Output,
-    zero: Vec<u32>,
+    coarse: CoarseEncoders,
     rail: RailEnds,
-    total_kg: f64,
+    defect: Option<Defective<'a>>,
+    surroundings: Surroundings,
     /// Simulated time since the start (s).
     t_s: f64,
     epoch: Duration,
     restart: Option<bool>,
-    /// Travel per pulse (m) of a drive that takes them.
-    pulse_m: Option<f64>,
 }
 
-impl<'a, 't> World<'a, 't> {
+impl<'a, 't> PoweredMachine<'a, 't> {
     /// Switches the power on: `target` has just started. The rig hangs, or is raised by hand. Commands are numbered by
     /// the time, so `epoch`, the time since 1970, has to grow from one power-up to the next.
     ///
@@ -73,42 +64,27 @@ impl<'a, 't> World<'a, 't> {
         epoch: Duration,
     ) -> Result<Self, HarnessError> {
         let SimulatedMachine { rig, table, scenario } = machine;
-        let mut harness = Harness::new(rig, table, scenario, target)?;
-        let output = if upright { harness.raise(None)? } else { Output::OFF };
-        let period_s = rig.tick.period_s;
-        let (spring, total_kg) = match &rig.plant {
-            PlantDescription::Chain(chain) => (Some(Spring::of(chain, period_s)), chain.total_mass_kg()),
-            PlantDescription::Model(_) => (None, 1.0),
-        };
-        let mut hold = ManualHold::new(rig);
-        if !upright {
-            hold.take(Holding::Hanging, harness.bench.state());
+        let mut world = World::new(rig, table, scenario, target)?;
+        if upright {
+            world.raise(None)?;
         }
         let mut zero = vec![0; table.sensors()];
-        harness.bench.read_counters_at_zero(&mut zero);
-        let mut world = Self {
+        world.bench.read_counters_at_zero(&mut zero);
+        let mut powered = Self {
             machine,
-            pace: SimulationPace::new(period_s),
-            harness,
-            spring,
-            pulled: None,
-            pull: None,
-            hold,
+            pace: SimulationPace::new(rig.tick.period_s),
+            world,
             properties,
-            defect: None,
-            challenge: None,
-            delayed: VecDeque::new(),
-            output,
-            zero,
+            coarse: CoarseEncoders { step: 1, zero },
             rail: RailEnds::of(rig),
-            total_kg,
+            defect: None,
+            surroundings: Surroundings::new(rig, if upright { Holding::Free } else { Holding::Hanging }),
             t_s: 0.0,
             epoch,
             restart: None,
-            pulse_m: rig.actuator.pulses().map(|drive| drive.step_m),
         };
-        world.rebuild()?;
-        Ok(world)
+        powered.rebuild()?;
+        Ok(powered)
     }
 
     /// Simulated time, as the time since 1970: in slow motion the firmware's timeouts are slow, too.
@@ -163,8 +139,8 @@ impl<'a, 't> World<'a, 't> {
             ..self.machine.scenario.clone()
         };
         let mut bench = Bench::new(&rig, &scenario)?;
-        bench.take_over(&self.harness.bench);
-        self.harness.bench = bench;
+        bench.take_over(&self.world.bench);
+        self.world.bench = bench;
         Ok(())
     }
 
@@ -175,10 +151,10 @@ impl<'a, 't> World<'a, 't> {
     pub fn carry_out(&mut self, request: MachineRequest, console: &mut Console) -> Result<(), HarnessError> {
         match request {
             MachineRequest::Pull { body, along, x, y } => {
-                self.pulled = Some(PulledPoint { body, along, to: [x, y] });
+                self.surroundings.pulled = Some(PulledPoint { body, along, to: [x, y] });
             }
-            MachineRequest::LetGo {} => self.pulled = None,
-            MachineRequest::Hold { how } => self.hold.take(how, self.harness.bench.state()),
+            MachineRequest::LetGo {} => self.surroundings.pulled = None,
+            MachineRequest::Hold { how } => self.surroundings.how = how,
             MachineRequest::Set { name, value } => match self.properties.set(&name, value) {
                 Some(true) => self.rebuild()?,
                 Some(false) => {}
@@ -190,7 +166,7 @@ impl<'a, 't> World<'a, 't> {
             MachineRequest::Step { ticks } => self.pace.step(ticks),
             MachineRequest::Challenge { on } => {
                 let limit_n = push_limit_n(self.machine.rig, self.machine.table);
-                self.challenge = on.then(|| Challenge::new(limit_n, self.t_s.to_bits()));
+                self.surroundings.challenge = on.then(|| Challenge::new(limit_n, self.t_s.to_bits()));
             }
             MachineRequest::Restart { upright } => self.restart = Some(upright),
         }
@@ -207,94 +183,135 @@ impl<'a, 't> World<'a, 't> {
         };
         let SimulatedMachine { rig, table, scenario } = self.machine;
         let trial = Trial::by_hand(kind, scenario, table, sensor, self.t_s.to_bits());
-        let mut defect = Defective::new(rig, table, trial);
         // The conversation numbers its commands by the time.
-        self.harness.session.count_from(self.now().as_micros() as u64);
-        defect.begin(&mut self.harness.session);
-        self.defect = Some(defect);
+        self.world.session.count_from(self.now().as_micros() as u64);
+        self.defect = Some(Defective::new(rig, table, trial, Some(self.world.ticks() + 1)));
     }
 
     /// One tick of the rig, the conversation and the firmware.
     fn tick(&mut self, console: &mut Console) -> Result<(), HarnessError> {
-        self.move_rig();
-        let now = self.now();
+        let (now, tick) = (self.now(), self.world.ticks());
         console.monitor.poll(now);
         let outgoing = console.monitor.take_outgoing();
-        if self.defect.as_ref().is_none_or(Defective::host_is_alive) {
-            self.harness.session.send_bytes(&outgoing);
+        if self.defect.as_ref().is_none_or(|defect| defect.host_is_alive(tick)) {
+            self.world.session.send_bytes(&outgoing);
         }
-        let mut inputs = self.harness.inputs();
-        self.coarsen(&mut inputs);
-        self.rail.press(self.harness.bench.state()[0], &mut inputs.contacts);
-        if let Some(defect) = &mut self.defect {
-            defect.inputs(&mut inputs);
-        }
-        self.output = self.harness.session.tick(&inputs)?;
-        let session = &mut self.harness.session;
-        let telemetry = console.monitor.receive(session.last_bytes(), now);
+        self.coarse.step = self.properties.get(COARSENESS) as i64;
+        self.surroundings.delay_ticks = self.properties.get(DELAY) as usize;
+        self.surroundings.defect_n = self.defect.as_ref().map_or(0.0, |defect| defect.push_n(tick));
+        // What is wrong with a sensor is behind its resolution, and what is wrong with the motor before its delay.
+        let parts: &mut [&mut dyn Participant] =
+            &mut [&mut self.coarse, &mut self.rail, &mut self.defect, &mut self.surroundings];
+        let _ = self.world.tick(parts)?;
+        let telemetry = console.monitor.receive(self.world.session.last_bytes(), now);
         console.take(telemetry);
-        session.forget_received();
+        self.world.session.forget_received();
         self.t_s += self.machine.rig.tick.period_s;
         Ok(())
     }
 
-    /// Moves the rig by one tick: by hand, or by the motor and whatever pulls and pushes.
-    fn move_rig(&mut self) {
-        let mut output = self.output;
-        if let Some(defect) = &mut self.defect {
-            defect.output(&mut output);
+    /// The part of a picture that only a simulation knows.
+    pub fn picture(&self) -> Value {
+        let is_pulled = self.surroundings.pull.as_ref().zip(self.surroundings.pulled.as_ref());
+        json!({
+            "t_s": self.t_s,
+            "state": self.world.bench.state(),
+            "pull": is_pulled.map(|(pull, pulled)| json!({
+                "body": pulled.body, "along": pulled.along, "to": pulled.to, "force_n": pull.force_n,
+            })),
+            "holding": self.surroundings.how,
+            "properties": self.properties.all().collect::<std::collections::BTreeMap<_, _>>(),
+            "defect": self.defect.as_ref().map(|defect| defect.kind().name()),
+            "challenge": self.surroundings.challenge,
+            "speed": self.pace.speed(),
+            "factor": self.pace.factor(),
+            "paused": self.pace.is_paused(),
+        })
+    }
+}
+
+/// Coarser encoders: the counters move in steps of several counts.
+struct CoarseEncoders {
+    step: i64,
+    /// The counters at position 0.
+    zero: Vec<u32>,
+}
+
+impl Participant for CoarseEncoders {
+    fn pins(&mut self, _: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        if self.step <= 1 {
+            return Ok(());
         }
-        self.delayed.push_back(output);
-        while self.delayed.len() > self.properties.get(DELAY) as usize + 1 {
-            self.delayed.pop_front();
+        for (sensor, (counter, &zero)) in pins.raw_counts.iter_mut().zip(&self.zero).enumerate() {
+            let counts = Bench::signed(sensor, counter.wrapping_sub(zero));
+            let coarse = (counts + self.step / 2).div_euclid(self.step) * self.step;
+            *counter = Bench::reading(sensor, zero.wrapping_add(coarse as u32));
         }
-        let output = self.delayed.front().copied().unwrap_or(Output::OFF);
-        let push_n = self.pushes();
-        let status = self.harness.session.status();
-        let carried_m = self.pulse_m.map(|pulse_m| pulse_m * f64::from(output.pulses()));
-        if let Some(held) =
-            self.hold.tick(&status, self.harness.bench.state(), carried_m.filter(|_| output.enable))
-        {
-            let held = held.to_vec();
-            self.pull = None;
-            return self.harness.bench.hold(&held);
-        }
-        let state = self.harness.bench.state();
-        self.pull =
-            self.pulled.as_ref().zip(self.spring.as_ref()).map(|(pulled, spring)| spring.pull(pulled, state));
-        let stop_n = self.end_stop_n(state);
-        let (cart_n, mut torques) = match &self.pull {
-            Some(pull) => (pull.cart_n, pull.torques_n_m.clone()),
-            None => (0.0, Vec::new()),
+        Ok(())
+    }
+}
+
+/// What moves the rig besides its motor: the person's hand, which holds it or pulls at it, pushes, and the end stops.
+struct Surroundings {
+    how: Holding,
+    spring: Option<Spring>,
+    pulled: Option<PulledPoint>,
+    pull: Option<Pull>,
+    challenge: Option<Challenge>,
+    /// Push of a defect (N).
+    defect_n: f64,
+    /// Ticks by which the motor is late, and the outputs on the way to it.
+    delay_ticks: usize,
+    delayed: VecDeque<Output>,
+    rail: RailEnds,
+    total_kg: f64,
+    takes_pulses: bool,
+    period_s: f64,
+}
+
+impl Surroundings {
+    fn new(rig: &Rig, how: Holding) -> Self {
+        let period_s = rig.tick.period_s;
+        let (spring, total_kg) = match &rig.plant {
+            PlantDescription::Chain(chain) => (Some(Spring::of(chain, period_s)), chain.total_mass_kg()),
+            PlantDescription::Model(_) => (None, 1.0),
         };
-        let is_at_stop = carried_m.is_some_and(|carried_m| stop_n * carried_m < 0.0);
-        if let (Some(_), Some(spring)) = (self.pulse_m, &self.spring) {
-            // The cart goes where its pulses say, whatever pushes it.
-            let pushed = spring.torques_at_first(push_n, state);
-            torques.resize(pushed.len(), 0.0);
-            torques.iter_mut().zip(pushed).for_each(|(torque, pushed)| *torque += pushed);
+        Self {
+            how,
+            spring,
+            pulled: None,
+            pull: None,
+            challenge: None,
+            defect_n: 0.0,
+            delay_ticks: 0,
+            delayed: VecDeque::new(),
+            rail: RailEnds::of(rig),
+            total_kg,
+            takes_pulses: rig.actuator.pulses().is_some(),
+            period_s,
         }
-        self.harness.bench.pull(push_n + stop_n + cart_n, &torques);
-        if let Some(defect) = self.defect.as_ref().and_then(Defective::step_defect) {
-            self.harness.bench.spoil(defect);
+    }
+
+    /// What the hand does. While the motor pushes the cart, the rig is let go, and held again afterwards.
+    fn wish(&self, status: &Status) -> Wish {
+        match (self.how, status.signs) {
+            (Holding::Free, _) => Wish::Free,
+            _ if status.state == State::Jogging => Wish::Free,
+            (Holding::Guided, Signs::Move(sensor)) => Wish::Turn(sensor),
+            (Holding::Guided, _) => Wish::Hang,
+            (Holding::Hanging, _) => Wish::PushTo(0.0),
+            (Holding::Upright, _) => Wish::Raise,
         }
-        if is_at_stop {
-            self.harness.bench.spoil(StepDefect::Jammed);
-        }
-        // A motor that is off turns freely.
-        let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
-        self.harness.bench.tick(drive);
     }
 
     /// Pushes of the defect and of the challenge (N): on the cart, or on the first link of a rig whose cart goes where
     /// its pulses say.
-    fn pushes(&mut self) -> f64 {
+    fn pushes(&mut self, world: &World<'_>) -> f64 {
         // A drive that takes pulses is on while it only holds the cart, too.
-        let controls = self.pulse_m.is_none() || self.harness.session.status().state.controls();
-        let survives = self.output.enable && controls;
+        let controls = !self.takes_pulses || world.session.status().state.controls();
+        let survives = world.output().enable && controls;
         let challenge = self.challenge.as_mut();
-        let defect = self.defect.as_ref().map_or(0.0, Defective::push_n);
-        defect + challenge.map_or(0.0, |challenge| challenge.tick(survives, self.machine.rig.tick.period_s))
+        self.defect_n + challenge.map_or(0.0, |challenge| challenge.tick(survives, self.period_s))
     }
 
     /// Force of the end stops on the cart (N): a spring and a damper each.
@@ -304,41 +321,44 @@ impl<'a, 't> World<'a, 't> {
         if beyond == 0.0 {
             return 0.0;
         }
-        let rate = 1.0 / self.machine.rig.tick.period_s;
+        let rate = 1.0 / self.period_s;
         let force = -self.total_kg * (STOP[0] * rate * rate * beyond + STOP[1] * rate * state[1]);
         // A stop pushes and never pulls.
         if force * beyond < 0.0 { force } else { 0.0 }
     }
+}
 
-    /// Coarser encoders: the counters move in steps of several counts.
-    fn coarsen(&self, inputs: &mut Pins) {
-        let step = self.properties.get(COARSENESS) as i64;
-        if step <= 1 {
+impl Participant for Surroundings {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        self.delayed.push_back(*output);
+        while self.delayed.len() > self.delay_ticks + 1 {
+            self.delayed.pop_front();
+        }
+        *output = self.delayed.front().copied().unwrap_or(Output::OFF);
+        let push_n = self.pushes(world);
+        let wish = self.wish(&world.session.status());
+        world.hand.does(wish, world.bench.state(), output);
+        self.pull = None;
+        if world.hand.has_hold() {
             return;
         }
-        for (sensor, (counter, &zero)) in inputs.raw_counts.iter_mut().zip(&self.zero).enumerate() {
-            let counts = Bench::signed(sensor, counter.wrapping_sub(zero));
-            let coarse = (counts + step / 2).div_euclid(step) * step;
-            *counter = Bench::reading(sensor, zero.wrapping_add(coarse as u32));
+        let state = world.bench.state();
+        self.pull =
+            self.pulled.as_ref().zip(self.spring.as_ref()).map(|(pulled, spring)| spring.pull(pulled, state));
+        let stop_n = self.end_stop_n(state);
+        let (cart_n, mut torques) = match &self.pull {
+            Some(pull) => (pull.cart_n, pull.torques_n_m.clone()),
+            None => (0.0, Vec::new()),
+        };
+        if let (true, Some(spring)) = (self.takes_pulses, &self.spring) {
+            // The cart goes where its pulses say, whatever pushes it.
+            let pushed = spring.torques_at_first(push_n, state);
+            torques.resize(pushed.len(), 0.0);
+            torques.iter_mut().zip(pushed).for_each(|(torque, pushed)| *torque += pushed);
         }
-    }
-
-    /// The part of a picture that only a simulation knows.
-    pub fn picture(&self) -> Value {
-        let is_pulled = self.pull.as_ref().zip(self.pulled.as_ref());
-        json!({
-            "t_s": self.t_s,
-            "state": self.harness.bench.state(),
-            "pull": is_pulled.map(|(pull, pulled)| json!({
-                "body": pulled.body, "along": pulled.along, "to": pulled.to, "force_n": pull.force_n,
-            })),
-            "holding": self.hold.how(),
-            "properties": self.properties.all().collect::<std::collections::BTreeMap<_, _>>(),
-            "defect": self.defect.as_ref().map(|defect| defect.kind().name()),
-            "challenge": self.challenge,
-            "speed": self.pace.speed(),
-            "factor": self.pace.factor(),
-            "paused": self.pace.is_paused(),
-        })
+        world.bench.pull(push_n + stop_n + cart_n, &torques);
+        if stop_n * f64::from(output.pulses()) < 0.0 {
+            world.bench.spoil(StepDefect::Jammed);
+        }
     }
 }

@@ -6,7 +6,7 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::table::{Equilibrium, TableError};
-use upright_closed_loop::harness::{Harness, HarnessError, Pins, Recording, record, with_firmware};
+use upright_closed_loop::harness::{HarnessError, Pins, Recording, World, record, with_firmware};
 use upright_design::motion::Transition;
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
@@ -109,39 +109,38 @@ fn raised_with(rig: &Rig, table: &TableValues, wrong: Wrong) -> (Option<Fault>, 
     let mut scenario = scenario(rig, table, 3);
     scenario.counter_start = 0;
     with_firmware(table, |target| {
-        let mut harness = Harness::new(rig, table, &scenario, target).unwrap();
-        let mut output = harness.raise(None).unwrap();
-        let zero = harness.inputs().raw_counts;
+        let mut world = World::new(rig, table, &scenario, target).unwrap();
+        let mut output = world.raise(None).unwrap();
+        let zero = world.inputs().raw_counts;
         let mut largest = 0.0f64;
         for _ in 0..table.swing_up.as_ref().unwrap().raise.ticks {
             if !output.enable {
                 break;
             }
             let hanging = |angle: f64| core::f64::consts::PI - angle.abs();
-            largest =
-                absolute_angles(harness.bench.state()).map(hanging).map(f64::abs).fold(largest, f64::max);
+            largest = absolute_angles(world.bench.state()).map(hanging).map(f64::abs).fold(largest, f64::max);
             let factor = match wrong {
                 Wrong::MotorDead => 0.0,
                 Wrong::MotorReversed => -1.0,
                 Wrong::MotorHalf => 0.5,
                 _ => 1.0,
             };
-            harness.bench.tick(match output.drive {
+            world.bench.tick(match output.drive {
                 Drive::Force(force) => Drive::Force(factor * force),
                 Drive::Duty(duty) => Drive::Duty(factor * duty),
                 Drive::Steps(_) => panic!("pulses for a motor"),
             });
-            let mut inputs = harness.inputs();
+            let mut inputs = world.inputs();
             disturb(&mut inputs, &zero, wrong);
-            output = harness.session.tick(&inputs).unwrap();
+            output = world.session.tick(&inputs).unwrap();
         }
         // Continue until the fault is reported. The links must keep moving, or every encoder would count as frozen.
         for _ in 0..2 {
-            harness.bench.tick(output.drive);
-            let inputs = harness.inputs();
-            output = harness.session.tick(&inputs).unwrap();
+            world.bench.tick(output.drive);
+            let inputs = world.inputs();
+            output = world.session.tick(&inputs).unwrap();
         }
-        (harness.session.fault(), largest)
+        (world.session.fault(), largest)
     })
     .unwrap()
 }
@@ -273,9 +272,9 @@ fn up_and_down_are_refused_with_their_reasons() {
     let scenario = scenario(&rig, &table, 1);
     let refused = |table: &TableValues, request: Request| {
         with_firmware(table, |target| {
-            let mut harness = Harness::new(&rig, table, &scenario, target).unwrap();
-            let inputs = harness.inputs();
-            match harness.session.ask(request, &inputs) {
+            let mut world = World::new(&rig, table, &scenario, target).unwrap();
+            let inputs = world.inputs();
+            match world.session.ask(request, &inputs) {
                 Err(HarnessError::Refused { answer: Answer::NotNow(inhibits), .. }) => inhibits,
                 answer => panic!("{answer:?}"),
             }

@@ -13,10 +13,12 @@ use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
 use upright::table::Equilibrium;
-use upright_closed_loop::harness::{Harness, Pins, with_firmware};
+use upright_closed_loop::harness::{
+    Flow, Goals, HarnessError, Participant, Pins, World, until, with_firmware,
+};
 use upright_design::motion::{PlannedMotion, Transition, equilibrium_named};
 use upright_design::rig::Rig;
-use upright_design::simulate::Scenario;
+use upright_design::simulate::{Goal, Scenario};
 use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_plan::{Route, Script, StoredTransitions, route_runs, with_motions};
@@ -118,30 +120,53 @@ fn machines_with_wrong_masses_make_the_route_and_with_reversed_gains_none_does()
 fn hold(
     table: &TableValues,
     rig: &Rig,
-    mut read: impl FnMut(usize, &mut Pins),
-    mut then: impl FnMut(usize, &mut Harness<'_>, &mut Output) -> bool,
+    read: impl FnMut(usize, &mut Pins),
+    then: impl FnMut(usize, &mut World<'_>, &mut Output) -> bool,
 ) {
-    let scenario =
-        Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, ..Scenario::swing_up(rig, 0.0, None) };
-    let goals = [(5400, transition("uu-ud").to(2))];
+    let scenario = Scenario {
+        force_noise_n: 0.0,
+        torque_noise_n_m: 0.0,
+        goals: vec![Goal { at_s: 5400.0 * rig.tick.period_s, to: transition("uu-ud").to(2) }],
+        ..Scenario::swing_up(rig, 0.0, None)
+    };
     with_firmware(table, |target| {
-        let mut harness = Harness::new(rig, table, &scenario, target).unwrap();
-        let mut output = harness.raise(None).unwrap();
-        let mut held = 0;
-        for tick in 0..20_000 {
-            harness.ask_for(tick, &goals);
-            if held > 0 && then(held, &mut harness, &mut output) {
-                return;
-            }
-            harness.bench.tick(output.drive);
-            let mut inputs = harness.inputs();
-            read(held, &mut inputs);
-            output = harness.session.tick(&inputs).unwrap();
-            held += usize::from(held > 0 || harness.session.status().state == State::Holding);
-        }
-        panic!("it does not end: {:?}, {:?}", harness.session.status().state, harness.session.fault());
+        let mut world = World::new(rig, table, &scenario, target).unwrap();
+        world.raise(None).unwrap();
+        world.goals = Goals::of(rig, &scenario);
+        let mut held = Held { held: 0, read, then, is_over: false };
+        world.run(20_000, &mut [&mut held]).unwrap();
+        let state = world.session.status().state;
+        assert!(held.is_over, "it does not end: {state:?}, {:?}", world.session.fault());
     })
     .unwrap();
+}
+
+/// Holds, with what [`hold`] is given.
+struct Held<R, T> {
+    held: usize,
+    read: R,
+    then: T,
+    is_over: bool,
+}
+
+impl<R, T> Participant for Held<R, T>
+where
+    R: FnMut(usize, &mut Pins),
+    T: FnMut(usize, &mut World<'_>, &mut Output) -> bool,
+{
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        self.is_over = self.held > 0 && (self.then)(self.held, world, output);
+    }
+
+    fn pins(&mut self, _: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        (self.read)(self.held, pins);
+        Ok(())
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        self.held += usize::from(self.held > 0 || world.session.status().state == State::Holding);
+        until(self.is_over)
+    }
 }
 
 /// Ticks of holding after which a defect begins, and ticks for which somebody then pushes the cart.
@@ -162,11 +187,11 @@ fn ended(
     drive: impl Fn(&mut Drive),
 ) -> Option<(Fault, usize)> {
     let mut ended = None;
-    hold(table, rig, read, |held, harness, output| {
-        ended = harness.session.fault().map(|fault| (fault, held.saturating_sub(ONSET)));
+    hold(table, rig, read, |held, world, output| {
+        ended = world.session.fault().map(|fault| (fault, held.saturating_sub(ONSET)));
         assert!(ended.is_none() || !output.enable, "a fault turns the motor off");
         if (ONSET..ONSET + TAP).contains(&held) {
-            harness.bench.pull(2.0, &[0.0; 2]);
+            world.bench.pull(2.0, &[0.0; 2]);
         }
         if held >= ONSET {
             drive(&mut output.drive);
@@ -183,17 +208,17 @@ fn where_a_link_hangs_the_cart_follows_its_setpoint() {
         &table_to_hold(&table),
         &rig,
         |_, _| (),
-        |held, harness, _| {
-            assert_eq!(harness.session.fault(), None);
+        |held, world, _| {
+            assert_eq!(world.session.fault(), None);
             match held {
-                500 => _ = harness.session.send(Request::Setpoint(0.05)),
-                501.. if held % 25 == 0 => _ = harness.session.send(Request::KeepAlive),
+                500 => _ = world.session.send(Request::Setpoint(0.05)),
+                501.. if held % 25 == 0 => _ = world.session.send(Request::KeepAlive),
                 _ => {}
             }
             if held == 8000 {
-                let x = harness.bench.state()[0];
+                let x = world.bench.state()[0];
                 assert!((x - 0.05).abs() < 0.01, "{x}");
-                assert_eq!(harness.session.status().state, State::Holding);
+                assert_eq!(world.session.status().state, State::Holding);
             }
             held == 8000
         },
@@ -258,21 +283,21 @@ fn goals_and_set_points_at_any_moment_never_end_in_a_fault() {
             &table,
             &rig,
             |_, _| (),
-            |held, harness, output| {
-                assert_eq!(harness.session.fault(), None, "seed {seed}, tick {held}");
+            |held, world, output| {
+                assert_eq!(world.session.fault(), None, "seed {seed}, tick {held}");
                 let drive = output.drive.value();
                 assert!(drive.is_finite());
-                states.push(harness.session.status().state);
+                states.push(world.session.status().state);
                 if held == next {
                     next += random.random_range(1..1500);
-                    harness.session.send(match random.random_range(0..4) {
+                    world.session.send(match random.random_range(0..4) {
                         0 => Request::Setpoint(random.random_range(-0.1..0.1)),
                         _ => Request::Goto(Equilibrium::of_bits(random.random_range(0..256))),
                     });
                 } else if held % 25 == 0 {
-                    harness.session.send(Request::KeepAlive);
+                    world.session.send(Request::KeepAlive);
                 }
-                while harness.session.next_reply().is_some() || harness.session.next_telemetry().is_some() {}
+                while world.session.next_reply().is_some() || world.session.next_telemetry().is_some() {}
                 held == 11_000
             },
         );
@@ -291,13 +316,13 @@ fn a_goal_is_refused_with_its_reasons() {
         &table,
         &rig,
         |_, _| (),
-        |held, harness, _| {
+        |held, world, _| {
             let mut ask = |to: &str| {
-                let id = harness.session.send(Request::Goto(equilibrium_named(to, 2).unwrap()));
+                let id = world.session.send(Request::Goto(equilibrium_named(to, 2).unwrap()));
                 for _ in 0..5 {
-                    let inputs = harness.inputs();
-                    harness.session.tick(&inputs).unwrap();
-                    while let Some((answered, answer)) = harness.session.next_reply() {
+                    let inputs = world.inputs();
+                    world.session.tick(&inputs).unwrap();
+                    while let Some((answered, answer)) = world.session.next_reply() {
                         if answered == id {
                             return answer;
                         }

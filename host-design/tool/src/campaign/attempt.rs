@@ -11,8 +11,10 @@ use upright_board::UNITS_PER_MICROSECOND;
 use super::observed::Observed;
 use super::on_board::OnChip;
 use crate::in_the_loop::{Events, RunError, RunPlace, VirtualBoard};
-use upright_closed_loop::defects::{Defect, Expected, Injection, Phase, Trial};
-use upright_closed_loop::harness::{Harness, HarnessError, Pins, RailEnds, Session, Target, goals, healthy};
+use upright_closed_loop::defects::{Defect, Defective, Expected, Phase, Trial};
+use upright_closed_loop::harness::{
+    Flow, Goals, HarnessError, Participant, Pins, RailEnds, Session, Target, World, healthy, until,
+};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::simulate::Begin;
@@ -92,19 +94,6 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
     Ok(observed)
 }
 
-/// Changes what the motor does, `since` ticks after the onset; returns whether the rig shows it by now.
-pub(super) fn spoil(
-    harness: &mut Harness<'_>,
-    injection: &mut Injection<'_>,
-    since: usize,
-    acting: &mut Output,
-) -> bool {
-    if let Some(defect) = injection.step_defect(since) {
-        harness.bench.spoil(defect);
-    }
-    injection.output(since, acting)
-}
-
 /// The limits of angles and rates while the rig is shaken are not in the table, so the angles per count are made
 /// smaller.
 fn blind_while_shaken(table: &mut TableValues) {
@@ -138,64 +127,36 @@ impl DefectRun<'_> {
         if let During::Shaking(feed) = self.setup.during {
             return self.shake(feed, target);
         }
-        let mut harness = Harness::new(self.rig, self.table, &self.trial.scenario, target)?;
+        let mut world = World::new(self.rig, self.table, &self.trial.scenario, target)?;
         match self.trial.kind {
-            _ if self.trial.phase == Phase::Jogging => self.jog(&mut harness),
+            _ if self.trial.phase == Phase::Jogging => self.jog(&mut world),
             Defect::ArmUnhomed | Defect::ArmHanging | Defect::ArmStopped | Defect::ArmHeld => {
-                self.arm(&mut harness)
+                self.arm(&mut world)
             }
-            _ => self.balance(&mut harness),
+            _ => self.balance(&mut world),
         }
     }
 
-    fn balance(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
+    fn balance(&self, world: &mut World<'_>) -> Result<Observed, HarnessError> {
         let trial = self.trial;
-        let mut observed = Observed::default();
-        let mut injection = Injection::new(self.rig, self.table, trial.clone());
-        let mut output = harness.raise(Some(0.0))?;
-        let keep_alive = self.ticks(KEEP_ALIVE.as_secs_f64());
-        let goals = goals(&self.trial.scenario, self.rig.tick.period_s);
-        for tick in 0.. {
-            if self.is_over(tick, &observed) {
-                break;
-            }
-            let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
-            let mut is_visible = false;
-            if tick > 0 {
-                output = self.control(harness, &mut injection, since, &mut is_visible)?;
-            }
-            if harness.ask_for(tick, &goals) {
-                // One command in a tick.
-            } else if tick == 1 {
-                harness.session.send(Request::Setpoint(trial.scenario.step_m as f32));
-            } else if tick.is_multiple_of(keep_alive) && injection.host_is_alive(since) {
-                harness.session.send(Request::KeepAlive);
-            }
-            if since == Some(0) {
-                injection.serial(&mut harness.session);
-                is_visible |= trial.kind == Defect::TableBit;
-            }
-            let is_on = self.is_on(&harness.session, &output);
-            observed.output(tick, output, is_on, self.ticks_since_stop(&harness.session));
-            if observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
-                observed.fault = harness.session.fault();
-            }
-            let mut acting = output;
-            is_visible |= since.is_some_and(|since| spoil(harness, &mut injection, since, &mut acting));
-            if is_visible {
-                observed.visible.get_or_insert(tick);
-            }
-            observed.outside |= observed.off.is_none()
-                && self.is_outside(tick, harness.begun().first().copied(), harness.bench.state());
-            let drive = if acting.enable { acting.drive } else { output.drive };
-            self.push(harness, &injection, since);
-            harness.bench.tick(drive);
+        world.raise(Some(0.0))?;
+        world.goals = Goals::of(self.rig, &trial.scenario);
+        let mut balanced = BalancedRun {
+            run: self,
+            defect: self.defective(Some(trial.onset)),
+            observed: Observed::default(),
+            fault: None,
+        };
+        let ran = world.run(usize::MAX, &mut [&mut balanced]);
+        let mut observed = balanced.observed;
+        if !observed.runs_on(ran)? {
+            return Ok(observed);
         }
-        observed.fault = harness.session.fault();
-        self.find_reason(harness, &mut observed);
+        observed.fault = balanced.fault;
+        self.find_reason(world, &mut observed);
         if trial.kind != Defect::HostDeaf && observed.off.is_none() {
-            let inputs = harness.inputs();
-            if let Ok(Answer::Statistics(statistics)) = harness.session.ask(Request::Statistics, &inputs) {
+            let inputs = world.inputs();
+            if let Ok(Answer::Statistics(statistics)) = world.session.ask(Request::Statistics, &inputs) {
                 observed.rejected = statistics.rejected_samples;
             }
         }
@@ -218,54 +179,45 @@ impl DefectRun<'_> {
         if self.stops(session) { session.ticks_since_fault().unwrap_or(1) } else { 0 }
     }
 
-    /// Pushes the rig in the next tick, `since` ticks after the onset: by hand, or at the cart alone.
-    fn push(&self, harness: &mut Harness<'_>, injection: &Injection<'_>, since: Option<usize>) {
-        let (Some(since), Some(chain)) = (since, self.rig.chain()) else { return };
-        let Some(push) = &self.trial.push else { return harness.bench.push(injection.push_n(since)) };
+    /// The defect of the trial, if the run has one, which begins in the firmware's tick `onset`.
+    pub(super) fn defective(&self, onset: Option<usize>) -> Defective<'_> {
+        Defective::new(self.rig, self.table, self.trial.clone(), onset.filter(|_| self.with_defect))
+    }
+
+    /// Pushes the rig in the next tick: by hand, or at the cart alone.
+    fn push(&self, world: &mut World<'_>, defect: &Defective<'_>) {
+        let (Some(since), Some(chain)) = (defect.since(world.ticks()), self.rig.chain()) else { return };
+        let Some(push) = &self.trial.push else { return world.bench.push(defect.push_n(world.ticks())) };
         let t = since as f64 * self.rig.tick.period_s;
-        if let Some((force_n, torques_n_m)) = push.in_tick(t, chain, harness.bench.state()) {
-            harness.bench.pull(force_n, &torques_n_m);
+        if let Some((force_n, torques_n_m)) = push.in_tick(t, chain, world.bench.state()) {
+            world.bench.pull(force_n, &torques_n_m);
         }
     }
 
     /// Asks a board whose motor went off without a fault why it has restarted.
-    pub(super) fn find_reason(&self, harness: &mut Harness<'_>, observed: &mut Observed) {
+    pub(super) fn find_reason(&self, world: &mut World<'_>, observed: &mut Observed) {
         if self.board.is_some() && observed.off.is_some() && observed.fault.is_none() {
-            observed.fault = self.reason(harness);
+            observed.fault = self.reason(world);
         }
         observed.dead |= observed.fault == Some(Fault::Crash);
     }
 
     /// The fault that stands for the reason of a board's last reset, if any.
-    fn reason(&self, harness: &mut Harness<'_>) -> Option<Fault> {
-        let inputs = harness.inputs();
-        match harness.session.ask(Request::Info, &inputs) {
+    fn reason(&self, world: &mut World<'_>) -> Option<Fault> {
+        let inputs = world.inputs();
+        match world.session.ask(Request::Info, &inputs) {
             Ok(Answer::Info(info)) => info.reset.fault(),
             _ => None,
         }
     }
 
-    /// One tick of the firmware, `since` ticks after the onset; sets `is_visible` if its inputs differ visibly.
-    pub(super) fn control(
+    /// Changes what the firmware reads, and starts what begins in its next tick.
+    pub(super) fn disturb(
         &self,
-        harness: &mut Harness<'_>,
-        injection: &mut Injection<'_>,
-        since: Option<usize>,
-        is_visible: &mut bool,
-    ) -> Result<Output, HarnessError> {
-        let inputs = self.pins(harness, injection, since, is_visible)?;
-        harness.session.tick(&inputs)
-    }
-
-    /// The firmware's inputs in this tick; also starts what begins in it.
-    pub(super) fn pins(
-        &self,
-        harness: &mut Harness<'_>,
-        injection: &mut Injection<'_>,
-        since: Option<usize>,
-        is_visible: &mut bool,
-    ) -> Result<Pins, HarnessError> {
-        let mut inputs = harness.inputs();
+        world: &mut World<'_>,
+        defect: &mut Defective<'_>,
+        pins: &mut Pins,
+    ) -> Result<(), HarnessError> {
         let has_switches = match self.trial.phase {
             Phase::Jogging => true,
             Phase::Shaken => self.setup.detection,
@@ -273,24 +225,14 @@ impl DefectRun<'_> {
         };
         if has_switches {
             // They alone keep the cart on its rail if its encoder is wrong.
-            RailEnds::of(self.rig).press(harness.bench.state()[0], &mut inputs.contacts);
+            RailEnds::of(self.rig).pins(world, pins)?;
         }
-        if let Some(since) = since {
-            *is_visible |= injection.inputs(since, &mut inputs);
+        defect.pins(world, pins)?;
+        if let Some(board) = self.board.as_ref().filter(|_| defect.since(world.ticks() + 1) == Some(0)) {
+            let events = self.trial.kind.events(self.trial, self.table, board.image, board.receive);
+            board.events.borrow_mut().extend(events);
         }
-        if since == Some(0) {
-            if let Some(fault) = self.trial.kind.inside_the_microcontroller() {
-                harness.session.injected_fault(fault);
-            }
-            if let Some(board) = &self.board {
-                let events = self.trial.kind.events(self.trial, self.table, board.image, board.receive);
-                board.events.borrow_mut().extend(events);
-            }
-            if self.trial.kind == Defect::HostDeaf {
-                harness.session.stop_reading()?;
-            }
-        }
-        Ok(inputs)
+        Ok(())
     }
 
     /// Whether nothing is left to be observed before `tick`.
@@ -379,38 +321,31 @@ impl DefectRun<'_> {
     }
 
     /// Homes the rig and checks its signs by hand; then the links hang.
-    pub(super) fn until_checked(&self, harness: &mut Harness<'_>) -> Result<(), HarnessError> {
-        for tick in 0.. {
-            harness.by_hand(tick)?;
-            // Without anything to check, the signs are known before the rig is homed.
-            let status = harness.session.status();
-            if status.signs == Signs::Checked && status.state == State::Calibrated {
-                break;
-            }
-        }
-        Ok(())
+    pub(super) fn until_checked(&self, world: &mut World<'_>) -> Result<(), HarnessError> {
+        // Without anything to check, the signs are known before the rig is homed.
+        world.by_hand_until(|status| status.signs == Signs::Checked && status.state == State::Calibrated)
     }
 
     /// Runs a trial in which arming has to be refused.
-    fn arm(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
+    fn arm(&self, world: &mut World<'_>) -> Result<Observed, HarnessError> {
         let mut observed = Observed::default();
         let mut stopped = false;
         if self.trial.kind != Defect::ArmUnhomed {
-            self.until_checked(harness)?;
+            self.until_checked(world)?;
         }
         if matches!(self.trial.kind, Defect::ArmStopped | Defect::ArmHeld) {
-            let mut inputs = harness.inputs();
+            let mut inputs = world.inputs();
             inputs.contacts.emergency_stop = true;
-            let output = harness.session.tick(&inputs)?;
-            observed.on_again |= self.is_on(&harness.session, &output);
+            let output = world.session.tick(&inputs)?;
+            observed.on_again |= self.is_on(&world.session, &output);
             stopped = self.trial.kind == Defect::ArmStopped;
         }
-        let mut inputs = harness.inputs();
+        let mut inputs = world.inputs();
         inputs.contacts.emergency_stop = stopped;
-        let mut refusal = harness.session.ask(Request::Arm, &inputs);
+        let mut refusal = world.session.ask(Request::Arm, &inputs);
         if self.trial.kind == Defect::ArmHeld {
-            harness.session.ask(Request::Clear, &inputs)?;
-            refusal = harness.session.ask(Request::Arm, &inputs);
+            world.session.ask(Request::Clear, &inputs)?;
+            refusal = world.session.ask(Request::Arm, &inputs);
         }
         match refusal {
             Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => {
@@ -420,9 +355,54 @@ impl DefectRun<'_> {
             Ok(_) => (),
         }
         for _ in 0..TICKS_AFTER {
-            let output = harness.session.tick(&inputs)?;
-            observed.on_again |= self.is_on(&harness.session, &output);
+            let output = world.session.tick(&inputs)?;
+            observed.on_again |= self.is_on(&world.session, &output);
         }
         Ok(observed)
+    }
+}
+
+/// A rig that balances, or is raised or lowered, with a defect from the onset on.
+struct BalancedRun<'r> {
+    run: &'r DefectRun<'r>,
+    defect: Defective<'r>,
+    observed: Observed,
+    fault: Option<Fault>,
+}
+
+impl Participant for BalancedRun<'_> {
+    fn say(&mut self, world: &World<'_>) -> Option<Request> {
+        let tick = world.ticks();
+        if tick == 1 {
+            return Some(Request::Setpoint(self.run.trial.scenario.step_m as f32));
+        }
+        let is_due = tick.is_multiple_of(self.run.ticks(KEEP_ALIVE.as_secs_f64()));
+        (is_due && self.defect.host_is_alive(tick)).then_some(Request::KeepAlive)
+    }
+
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        let (run, tick) = (self.run, world.ticks());
+        let is_on = run.is_on(&world.session, output);
+        self.observed.output(tick, *output, is_on, run.ticks_since_stop(&world.session));
+        self.fault = world.session.fault();
+        if self.observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
+            self.observed.fault = self.fault;
+        }
+        self.defect.act(world, output);
+        if self.defect.is_visible() {
+            self.observed.visible.get_or_insert(tick);
+        }
+        let lowered_from = world.goals.begun().first().copied();
+        self.observed.outside |=
+            self.observed.off.is_none() && run.is_outside(tick, lowered_from, world.bench.state());
+        run.push(world, &self.defect);
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        self.run.disturb(world, &mut self.defect, pins)
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        until(self.run.is_over(world.ticks(), &self.observed))
     }
 }

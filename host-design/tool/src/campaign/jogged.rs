@@ -5,10 +5,10 @@ use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright_closed_loop::defects::{Expected, Injection};
-use upright_closed_loop::harness::{Harness, HarnessError, Session};
+use upright_closed_loop::defects::{Defective, Expected};
+use upright_closed_loop::harness::{Flow, HarnessError, Participant, Pins, World, until};
 
-use super::attempt::{DefectRun, spoil};
+use super::attempt::DefectRun;
 use super::observed::Observed;
 
 /// Longest time from pressing the key until the motor is on (s).
@@ -16,87 +16,29 @@ const BEGIN_S: f64 = 0.5;
 
 impl DefectRun<'_> {
     /// A jog, in which a person holds the key throughout.
-    pub(super) fn jog(&self, harness: &mut Harness<'_>) -> Result<Observed, HarnessError> {
-        let trial = self.trial;
-        let is_there_before = matches!(trial.expected(), Expected::Found(_));
-        let mut held = self.checked_and_hanging(harness)?;
-        let mut observed = Observed::default();
-        let mut injection = Injection::new(self.rig, self.table, trial.clone());
-        // Number of ticks since the motor came on.
-        let mut tick: Option<usize> = None;
-        for turn in 0.. {
-            let since = match tick {
-                _ if !self.with_defect => None,
-                _ if is_there_before => Some(turn),
-                Some(tick) => (tick + 1).checked_sub(trial.onset),
-                None => None,
-            };
-            if turn % self.ticks(KEEP_ALIVE.as_secs_f64()) == 0 && injection.host_is_alive(since) {
-                harness.session.send(Request::Jog { along: trial.sign > 0.0 });
-            }
-            let output = self.control(harness, &mut injection, since, &mut false)?;
-            if since == Some(0) {
-                injection.serial(&mut harness.session);
-            }
-            let is_on = self.is_jogging(&harness.session, &output);
-            tick = match tick {
-                Some(tick) => Some(tick + 1),
-                None => is_on.then_some(0),
-            };
-            let mut acting = output;
-            if let Some(since) = since.filter(|_| is_there_before && output.enable) {
-                spoil(harness, &mut injection, since, &mut acting);
-            }
-            self.move_rig(harness, &acting, &mut held, is_there_before);
-            let Some(tick) = tick else {
-                if turn > self.ticks(BEGIN_S) {
-                    return Err(HarnessError::NotBalancing(harness.session.status().state));
-                }
-                continue;
-            };
-            let was_told = self.table.drive.pulses().is_some() && output.enable;
-            observed.output(tick, output, is_on, was_told.into());
-            observed.outside |= observed.off.is_none() && self.is_off_rail(harness.bench.state());
-            if observed.off.is_some() {
-                observed.fault = harness.session.fault();
-            }
-            if self.hanging_is_over(tick, &observed) {
-                break;
-            }
+    pub(super) fn jog(&self, world: &mut World<'_>) -> Result<Observed, HarnessError> {
+        self.check_and_hang(world)?;
+        let is_there_before = matches!(self.trial.expected(), Expected::Found(_));
+        let defect = self.defective(is_there_before.then_some(1));
+        let observed = Observed::default();
+        let mut jogged = Jogged { run: self, is_there_before, defect, observed, on: None };
+        let ran = world.run(usize::MAX, &mut [&mut jogged]);
+        let mut observed = jogged.observed;
+        if observed.runs_on(ran)? {
+            self.after_jog(world, &mut observed)?;
         }
-        self.after_jog(harness, &mut observed)?;
         Ok(observed)
     }
 
-    /// A tick of the rig, which hangs as in `held`: free, or held by a hand, which does not hold a cart that goes where
-    /// its pulses say.
-    fn move_rig(&self, harness: &mut Harness<'_>, output: &Output, held: &mut [f64], is_free: bool) {
-        let is_free = is_free && output.enable;
-        if is_free || self.table.drive.pulses().is_some() {
-            harness.bench.tick(output.drive);
-            held[0] = harness.bench.state()[0];
-        }
-        if !is_free {
-            harness.bench.hold(held);
-        }
-    }
-
-    /// Whether the motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
-    fn is_jogging(&self, session: &Session<'_>, output: &Output) -> bool {
-        output.enable && (self.table.drive.pulses().is_none() || session.status().state == State::Jogging)
-    }
-
-    /// Checks the signs by hand, and lets the links hang still, wherever the cart is; returns that state.
-    fn checked_and_hanging(&self, harness: &mut Harness<'_>) -> Result<Vec<f64>, HarnessError> {
-        let mut held = harness.bench.state().to_vec();
-        self.until_checked(harness)?;
-        held[0] = harness.bench.state()[0];
-        for _ in 0..self.ticks(self.rig.limits.arm_time_s) {
-            harness.bench.hold(&held);
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs)?;
-        }
-        Ok(held)
+    /// Checks the signs by hand, and lets the links hang still, wherever the cart is.
+    fn check_and_hang(&self, world: &mut World<'_>) -> Result<(), HarnessError> {
+        let mut hanging = world.bench.state().to_vec();
+        self.until_checked(world)?;
+        hanging[0] = world.bench.state()[0];
+        world.hand.hold_in(&hanging);
+        world.run(self.ticks(self.rig.limits.arm_time_s), &mut [])?;
+        world.count_from_here();
+        Ok(())
     }
 
     /// Whether nothing is left to be observed after `tick` of a rig that hangs.
@@ -109,11 +51,11 @@ impl DefectRun<'_> {
     }
 
     /// Reads what the firmware has found out, and whether it would arm.
-    fn after_jog(&self, harness: &mut Harness<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
-        self.find_reason(harness, observed);
-        observed.motor = Some(harness.session.status().motor);
-        let inputs = harness.inputs();
-        observed.refused = match harness.session.ask(Request::Arm, &inputs) {
+    fn after_jog(&self, world: &mut World<'_>, observed: &mut Observed) -> Result<(), HarnessError> {
+        self.find_reason(world, observed);
+        observed.motor = Some(world.session.status().motor);
+        let inputs = world.inputs();
+        observed.refused = match world.session.ask(Request::Arm, &inputs) {
             Err(HarnessError::Refused { answer: Answer::NotNow(reasons), .. }) => Some(reasons),
             // A wire that is open, or a board that has stopped.
             Err(HarnessError::NoAnswer(_)) => Some(Inhibits::NONE),
@@ -121,5 +63,79 @@ impl DefectRun<'_> {
             Ok(_) => None,
         };
         Ok(())
+    }
+}
+
+/// A rig that is pushed by its motor as long as a key is held, with a defect.
+struct Jogged<'r> {
+    run: &'r DefectRun<'r>,
+    /// Whether the defect is there before the motor comes on. The rig is free while it is on then, and otherwise held by
+    /// a hand, which does not hold a cart that goes where its pulses say.
+    is_there_before: bool,
+    defect: Defective<'r>,
+    observed: Observed,
+    /// The tick in which the motor came on.
+    on: Option<usize>,
+}
+
+impl Jogged<'_> {
+    /// Moves the rig, which hangs: free, or held by the hand.
+    fn move_rig(&self, world: &mut World<'_>, output: &Output) {
+        if self.is_there_before && output.enable {
+            return world.hand.let_go();
+        }
+        if self.run.table.drive.pulses().is_some() {
+            world.bench.tick(output.drive);
+        }
+        let cart_m = world.bench.state()[0];
+        world.hand.hold_again_at(cart_m);
+    }
+}
+
+impl Participant for Jogged<'_> {
+    fn say(&mut self, world: &World<'_>) -> Option<Request> {
+        let is_due = world.ticks() % self.run.ticks(KEEP_ALIVE.as_secs_f64()) == 0;
+        let presses = is_due && self.defect.host_is_alive(world.ticks() + 1);
+        presses.then_some(Request::Jog { along: self.run.trial.sign > 0.0 })
+    }
+
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        let (run, now) = (self.run, world.ticks());
+        if now == 0 {
+            return;
+        }
+        // The motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
+        let is_pulsed = run.table.drive.pulses().is_some();
+        let is_on = output.enable && (!is_pulsed || world.session.status().state == State::Jogging);
+        if is_on && self.on.is_none() {
+            self.on = Some(now);
+            if !self.is_there_before && run.with_defect {
+                self.defect.begin_in(now + run.trial.onset);
+            }
+        }
+        if let Some(on) = self.on {
+            self.observed.output(now - on, *output, is_on, usize::from(is_pulsed && output.enable));
+        }
+        self.defect.act(world, output);
+        self.move_rig(world, output);
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        self.run.disturb(world, &mut self.defect, pins)
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        let Some(on) = self.on else {
+            if world.ticks() > self.run.ticks(BEGIN_S) + 2 {
+                return Err(HarnessError::NotBalancing(world.session.status().state));
+            }
+            return until(false);
+        };
+        let observed = &mut self.observed;
+        observed.outside |= observed.off.is_none() && self.run.is_off_rail(world.bench.state());
+        if observed.off.is_some() {
+            observed.fault = world.session.fault();
+        }
+        until(self.run.hanging_is_over(world.ticks() - 1 - on, observed))
     }
 }

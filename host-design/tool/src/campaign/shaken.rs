@@ -2,16 +2,16 @@
 
 use core::f64::consts::PI;
 
-use upright::control::actuator::Drive;
+use upright::board::Output;
 use upright::protocol::message::Request;
 use upright::supervision::shaking::ANGLE_RAD;
 use upright::supervision::supervisor::State;
-use upright_closed_loop::defects::{Defect, Expected, Injection, Phase, SHAKEN_S};
-use upright_closed_loop::harness::{HarnessError, Target};
+use upright_closed_loop::defects::{Defect, Defective, Expected, Phase, SHAKEN_S};
+use upright_closed_loop::harness::{Flow, HarnessError, Participant, Pins, Target, World, until};
 use upright_design::plant::absolute_angles;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_identify::{Feed, IdentifyError, Shaken};
+use upright_identify::{Feed, IdentifyError, ShakingHost, checked_and_hanging};
 
 use super::attempt::{BEYOND, DefectRun, During};
 use super::observed::Observed;
@@ -59,55 +59,62 @@ impl During<'_> {
 impl DefectRun<'_> {
     /// The rig is shaken by a host that turns the motor off if the cart does not follow.
     pub(super) fn shake(&self, feed: &Feed, target: &mut dyn Target) -> Result<Observed, HarnessError> {
-        let trial = self.trial;
-        let mut shaken = Shaken::begin_with(feed.clone(), self.rig, self.table, target, trial.seed)?;
-        let mut observed = Observed::default();
-        let mut injection = Injection::new(self.rig, self.table, trial.clone());
-        let mut host_is_content = true;
-        for tick in 0usize.. {
-            let since = tick.checked_sub(trial.onset).filter(|_| self.with_defect);
-            let inputs = self.pins(&mut shaken.harness, &mut injection, since, &mut false)?;
-            if let Some(defect) = since.and_then(|since| injection.step_defect(since)) {
-                shaken.harness.bench.spoil(defect);
-            }
-            shaken.harness.bench.push(since.map_or(0.0, |since| injection.push_n(since)));
-            let output = shaken.act(&inputs, |drive| self.acting(&mut injection, since, drive))?;
-            // A drive with pulses also holds the cart and brings it to rest, which does not count.
-            let state = shaken.harness.session.status().state;
-            let is_shaken = self.table.drive.pulses().is_none() || state == State::Identifying;
-            let before = usize::from(output.enable && !is_shaken);
-            observed.output(tick, output, output.enable && is_shaken, before);
-            observed.outside |= observed.off.is_none() && self.is_out_of_bounds(shaken.harness.bench.state());
-            if observed.off.is_some() {
-                observed.fault = shaken.harness.session.fault();
-            }
-            if self.hanging_is_over(tick, &observed) {
-                break;
-            }
-            if since == Some(0) {
-                injection.serial(&mut shaken.harness.session);
-            }
-            if host_is_content && injection.host_is_alive(since) && shaken.feed().is_err() {
-                host_is_content = false;
-                shaken.harness.session.send(Request::Disarm);
-            }
+        let mut world = checked_and_hanging(self.rig, self.table, target, self.trial.seed)?;
+        let host = ShakingHost::begin(feed.clone(), self.rig, self.table, &mut world)?;
+        let defect = self.defective(Some(self.trial.onset));
+        let mut shaken = WhileShaken { run: self, host: Some(host), defect, observed: Observed::default() };
+        let ran = world.run(usize::MAX, &mut [&mut shaken]);
+        let mut observed = shaken.observed;
+        if observed.runs_on(ran)? {
+            self.find_reason(&mut world, &mut observed);
         }
-        self.find_reason(&mut shaken.harness, &mut observed);
         Ok(observed)
-    }
-
-    /// The drive that acts on the cart, which the defect may change.
-    fn acting(&self, injection: &mut Injection<'_>, since: Option<usize>, drive: Drive) -> Drive {
-        let mut acting = upright::board::Output::on(drive, &self.table.drive);
-        if let Some(since) = since {
-            injection.output(since, &mut acting);
-        }
-        acting.drive
     }
 
     /// Whether a link has turned too far from hanging, or the cart is off its rail.
     fn is_out_of_bounds(&self, state: &[f64]) -> bool {
         let farthest = f64::from(ANGLE_RAD) * (1.0 + BEYOND);
         self.is_off_rail(state) || absolute_angles(state).any(|angle| (angle - PI).abs() > farthest)
+    }
+}
+
+/// A rig that is shaken, with a defect from the onset on.
+struct WhileShaken<'r> {
+    run: &'r DefectRun<'r>,
+    /// The host, until the cart does not follow.
+    host: Option<ShakingHost>,
+    defect: Defective<'r>,
+    observed: Observed,
+}
+
+impl Participant for WhileShaken<'_> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        // A drive with pulses also holds the cart and brings it to rest, which does not count.
+        let state = world.session.status().state;
+        let is_shaken = self.run.table.drive.pulses().is_none() || state == State::Identifying;
+        let before = usize::from(output.enable && !is_shaken);
+        self.observed.output(world.ticks(), *output, output.enable && is_shaken, before);
+        if self.observed.off.is_some() {
+            self.observed.fault = world.session.fault();
+        }
+        world.bench.push(self.defect.push_n(world.ticks()));
+        self.defect.act(world, output);
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        self.run.disturb(world, &mut self.defect, pins)
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        let observed = &mut self.observed;
+        observed.outside |= observed.off.is_none() && self.run.is_out_of_bounds(world.bench.state());
+        let is_alive = self.defect.host_is_alive(world.ticks());
+        if let Some(host) = self.host.as_mut().filter(|_| is_alive)
+            && host.feed(&mut world.session).is_err()
+        {
+            self.host = None;
+            world.session.send(Request::Disarm);
+        }
+        until(self.run.hanging_is_over(world.ticks() - 1, &self.observed))
     }
 }

@@ -4,7 +4,7 @@ use core::fmt;
 use core::str::FromStr;
 
 use upright::board::Output;
-use upright_closed_loop::harness::Pins;
+use upright_closed_loop::harness::{HarnessError, Participant, Pins, World};
 use upright_design::rig::{Link, PerJoint, Rig};
 use upright_design::simulate::{Bench, Scenario, StepDefect};
 use upright_design::table::TableValues;
@@ -166,7 +166,8 @@ impl<'a> DefectWires<'a> {
     pub(super) fn new(rig: &Rig, table: &'a TableValues, scenario: &Scenario, planted: Planted) -> Self {
         let of_kind = |kind: Defect| {
             let trial = Trial::by_hand(kind, scenario, table, planted.sensor, scenario.seed);
-            Defective::new(rig, table, trial)
+            // It is there from power-up on.
+            Defective::new(rig, table, trial, Some(1))
         };
         let defective = match planted.what {
             What::Campaign(kind) => Some(of_kind(kind)),
@@ -174,39 +175,30 @@ impl<'a> DefectWires<'a> {
         };
         Self { planted, defective, at_power_up: None }
     }
+}
 
-    /// Changes what the firmware reads.
-    pub(super) fn inputs(&mut self, pins: &mut Pins) {
-        let sensor = self.planted.sensor;
-        match (self.planted.what, &mut self.defective) {
-            (What::Campaign(_), Some(defective)) => defective.inputs(pins),
-            (What::StopMissing, _) => pins.contacts.emergency_stop = false,
-            (What::SwitchMissing, _) => pins.contacts.limit_high = false,
-            (What::SwitchesExchanged, _) => {
+impl Participant for DefectWires<'_> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        if self.planted.what == What::CartFriction {
+            world.bench.spoil(StepDefect::Jammed);
+        }
+        self.defective.act(world, output);
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        match self.planted.what {
+            What::StopMissing => pins.contacts.emergency_stop = false,
+            What::SwitchMissing => pins.contacts.limit_high = false,
+            What::SwitchesExchanged => {
                 std::mem::swap(&mut pins.contacts.limit_low, &mut pins.contacts.limit_high);
             }
-            (What::CountsWrong, _) => {
-                let count = &mut pins.raw_counts[sensor];
+            What::CountsWrong => {
+                let count = &mut pins.raw_counts[self.planted.sensor];
                 let begin = *self.at_power_up.get_or_insert(*count);
-                *count = Bench::reading(sensor, count.wrapping_mul(2).wrapping_sub(begin));
+                *count = Bench::reading(self.planted.sensor, count.wrapping_mul(2).wrapping_sub(begin));
             }
-            (What::Campaign(_) | What::CartFriction | What::JointFriction, _) => {}
+            What::Campaign(_) | What::CartFriction | What::JointFriction => {}
         }
-    }
-
-    /// What is wrong in this tick with a drive that takes pulses.
-    pub(super) fn step_defect(&self) -> Option<StepDefect> {
-        match (self.planted.what, &self.defective) {
-            (What::CartFriction, _) => Some(StepDefect::Jammed),
-            (_, Some(defective)) => defective.step_defect(),
-            _ => None,
-        }
-    }
-
-    /// Changes the output to the motor.
-    pub(super) fn output(&mut self, output: &mut Output) {
-        if let Some(defective) = &mut self.defective {
-            defective.output(output);
-        }
+        self.defective.pins(world, pins)
     }
 }

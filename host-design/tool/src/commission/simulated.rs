@@ -3,11 +3,10 @@
 use std::time::Duration;
 
 use upright::board::Output;
-use upright::control::actuator::Drive;
 use upright::table::Law;
-use upright_closed_loop::harness::{HeldRig, Pins, RailEnds, Session, Target, healthy};
+use upright_closed_loop::harness::{Hand, HarnessError, Participant, Pins, RailEnds, Target, Wish, World};
 use upright_design::rig::Rig;
-use upright_design::simulate::{Bench, Scenario, SimulationError};
+use upright_design::simulate::{Scenario, SimulationError};
 use upright_design::table::TableValues;
 
 use super::machine::{MachineAtHand, Stop};
@@ -27,22 +26,11 @@ const TRIES: u32 = 2;
 
 /// A simulated machine with its firmware, held by a simulated hand until the hand lets go.
 pub struct Simulated<'a> {
-    session: Session<'a>,
-    bench: Bench,
-    held: HeldRig,
-    task: PersonTask,
-    is_free: bool,
-    tries: u32,
-    is_pressed: bool,
+    world: World<'a>,
+    person: PromptedPerson,
     wires: Option<DefectWires<'a>>,
-    output: Output,
-    counters: Vec<u32>,
-    supply_v: f32,
-    rail: RailEnds,
-    /// Travel per pulse (m) of a drive that takes them: no hand moves its cart while it is on.
-    pulse_m: Option<f64>,
+    tries: u32,
     period_s: f64,
-    ticks: u64,
 }
 
 impl<'a> Simulated<'a> {
@@ -62,130 +50,83 @@ impl<'a> Simulated<'a> {
         if let Some(planted) = planted {
             planted.change(&mut machine, table);
         }
-        let held = HeldRig::hanging(&machine);
-        let scenario =
-            Scenario { start: held.held().to_vec(), seed, ..Scenario::at_rest(&machine, Law::Lqr) };
+        let start = Hand::hanging(&machine).held().to_vec();
+        let scenario = Scenario { start, seed, ..Scenario::at_rest(&machine, Law::Lqr) };
         Ok(Self {
-            session: Session::new(target),
-            bench: Bench::new(&machine, &scenario)?,
-            held,
-            task: PersonTask::Rest,
-            is_free: false,
-            tries: 0,
-            is_pressed: false,
+            world: World::powered(&machine, table, &scenario, target)?,
+            person: PromptedPerson {
+                task: PersonTask::Rest,
+                is_pressed: false,
+                takes_pulses: table.drive.pulses().is_some(),
+                rail: RailEnds::of(&machine),
+            },
             wires: planted.map(|planted| DefectWires::new(&machine, table, &scenario, planted)),
-            output: Output::OFF,
-            counters: vec![0; table.sensors()],
-            supply_v: table.drive.supply_v().unwrap_or_default(),
-            rail: RailEnds::of(&machine),
-            pulse_m: machine.actuator.pulses().map(|drive| drive.step_m),
+            tries: 0,
             period_s: machine.tick.period_s,
-            ticks: 0,
         })
     }
 
     /// The true state of the machine.
     pub fn state(&self) -> &[f64] {
-        self.bench.state()
+        self.world.bench.state()
     }
+}
 
-    /// What the board reads now.
-    fn pins(&mut self) -> Pins {
-        self.bench.read_counters(&mut self.counters);
-        let mut pins = healthy(&self.counters, self.supply_v * self.bench.supply_share() as f32);
-        self.rail.press(self.bench.state()[0], &mut pins.contacts);
-        pins.contacts.emergency_stop = self.is_pressed;
-        if let Some(wires) = &mut self.wires {
-            wires.inputs(&mut pins);
-        }
-        pins
-    }
+/// The person at the machine, who does what is asked.
+struct PromptedPerson {
+    task: PersonTask,
+    /// Whether the emergency stop is pressed.
+    is_pressed: bool,
+    /// Whether the drive takes pulses.
+    takes_pulses: bool,
+    rail: RailEnds,
+}
 
-    /// One tick of person, firmware and machine.
-    fn tick(&mut self) -> Result<(), Stop> {
-        self.ticks += 1;
-        self.by_hand();
-        let pins = self.pins();
-        self.output = self.session.tick(&pins)?;
-        // Only the raw bytes are used: see `exchange`.
-        self.session.forget_received();
-        if self.is_free {
-            let mut output = self.output;
-            if let Some(wires) = &mut self.wires {
-                if let Some(defect) = wires.step_defect().filter(|_| self.pulse_m.is_some()) {
-                    self.bench.spoil(defect);
-                }
-                wires.output(&mut output);
-            }
-            // A motor that is off turns freely.
-            self.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
-        }
-        Ok(())
-    }
-
-    /// What the hand does in a tick.
-    fn by_hand(&mut self) {
+impl Participant for PromptedPerson {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
         // A drive with pulses also holds the cart before the control law commands it.
-        let controls = || self.session.status().state.controls();
-        let is_on = self.output.enable && (self.pulse_m.is_none() || controls());
-        let was_free = std::mem::replace(&mut self.is_free, self.task.lets_go(is_on));
-        if was_free && self.is_free {
-            return;
-        }
-        let driven_m = self.pulse_m.filter(|_| self.output.enable);
-        if was_free {
-            self.held.take(self.bench.state());
-            self.held.stop();
-        } else if let Some(pulse_m) = driven_m {
-            self.held.carry(f64::from(self.output.pulses()) * pulse_m);
-        }
-        match self.task {
-            _ if self.is_free => {}
-            PersonTask::Move(0) | PersonTask::PushTo(_) | PersonTask::Centre if driven_m.is_some() => {
-                self.held.rest();
-            }
-            PersonTask::Move(sensor) => self.held.turn(sensor),
-            PersonTask::PushTo(end) => {
-                self.held.push_to(self.rail.pressed_m()[usize::from(end == End::High)]);
-            }
-            PersonTask::Centre => {
-                self.held.push_to(0.0);
-            }
-            PersonTask::Raise => {
-                self.held.raise();
-            }
-            PersonTask::Catch => {}
-            _ => {
-                self.held.rest();
-            }
-        }
-        self.bench.hold(self.held.held());
+        let is_on = output.enable && (!self.takes_pulses || world.session.status().state.controls());
+        let wish = match self.task {
+            task if task.lets_go(is_on) => Wish::Free,
+            PersonTask::Move(sensor) => Wish::Turn(sensor),
+            PersonTask::PushTo(end) => Wish::PushTo(self.rail.pressed_m()[usize::from(end == End::High)]),
+            PersonTask::Centre => Wish::PushTo(0.0),
+            PersonTask::Raise => Wish::Raise,
+            PersonTask::Catch => Wish::Still,
+            _ => Wish::Rest,
+        };
+        world.hand.does(wish, world.bench.state(), output);
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        pins.contacts.emergency_stop = self.is_pressed;
+        self.rail.pins(world, pins)
     }
 }
 
 impl MachineAtHand for Simulated<'_> {
     fn exchange(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
-        self.session.send_bytes(bytes);
+        self.world.session.send_bytes(bytes);
         let mut received = Vec::new();
         for _ in 0..(EXCHANGE_S / self.period_s).ceil() as u32 {
-            self.tick()?;
-            received.extend_from_slice(self.session.last_bytes());
+            self.world.run(1, &mut [&mut self.person, &mut self.wires])?;
+            received.extend_from_slice(self.world.session.last_bytes());
         }
         Ok(received)
     }
 
     fn now(&self) -> Duration {
-        BEGIN + Duration::from_secs_f64(self.ticks as f64 * self.period_s)
+        BEGIN + Duration::from_secs_f64(self.world.ticks() as f64 * self.period_s)
     }
 
     fn ask(&mut self, task: PersonTask) -> Result<(), Stop> {
         match task {
-            PersonTask::PressStop => self.is_pressed = true,
-            PersonTask::ReleaseStop => self.is_pressed = false,
-            PersonTask::TurnAround(sensor) => self.held.wind(sensor),
+            PersonTask::PressStop => self.person.is_pressed = true,
+            PersonTask::ReleaseStop => self.person.is_pressed = false,
+            PersonTask::TurnAround(sensor) => self.world.hand.wind(sensor),
             _ => {}
         }
-        self.task = task;
+        self.person.task = task;
         Ok(())
     }
 

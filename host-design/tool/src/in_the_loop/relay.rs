@@ -4,7 +4,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-use upright_closed_loop::harness::{Harness, Target};
+use upright::board::Output;
+use upright_closed_loop::harness::{Flow, Participant, Target, World, until};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -40,38 +41,19 @@ struct Relay<'a> {
 
 impl Relay<'_> {
     fn run(self, target: &mut dyn Target) -> Result<(), RunError> {
-        let period_s = self.rig.tick.period_s;
-        let mut harness = Harness::new(self.rig, self.table, self.scenario, target)?;
+        let mut world = World::new(self.rig, self.table, self.scenario, target)?;
         // No set-point is commanded, so the firmware needs no keep-alives.
-        let mut output = harness.raise(None)?;
+        world.raise(None)?;
         self.listener.set_nonblocking(true)?;
-        let mut client = Some(self.first_client()?);
-        let begin = Instant::now();
-        let mut tick = 0u32;
-        while f64::from(tick) * period_s < self.scenario.duration_s {
-            if output.enable {
-                harness.bench.tick(output.drive);
-            } else {
-                harness.bench.hold(&self.scenario.start);
-            }
-            if client.is_none() {
-                client = accepted(self.listener)?;
-            }
-            let received = client.as_mut().map_or(Some(Vec::new()), receive);
-            harness.session.send_bytes(received.as_deref().unwrap_or(&[]));
-            let inputs = harness.inputs();
-            output = harness.session.tick(&inputs)?;
-            harness.session.forget_received();
-            let is_connected =
-                client.as_mut().is_none_or(|stream| send(stream, harness.session.last_bytes()));
-            if received.is_none() || !is_connected {
-                client = None;
-            }
-            tick += 1;
-            let due = begin + Duration::from_secs_f64(f64::from(tick) * period_s);
-            std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        }
-        Ok(())
+        let mut line = SocketLine {
+            relay: &self,
+            client: Some(self.first_client()?),
+            begin: Instant::now(),
+            failed: None,
+        };
+        let ticks = (self.scenario.duration_s / self.rig.tick.period_s).ceil() as usize;
+        world.run(ticks, &mut [&mut line])?;
+        line.failed.map_or(Ok(()), |error| Err(error.into()))
     }
 
     /// Waits for the first client, as long as the run would last.
@@ -86,6 +68,43 @@ impl Relay<'_> {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+}
+
+/// The line between the client and the firmware.
+struct SocketLine<'a> {
+    relay: &'a Relay<'a>,
+    client: Option<TcpStream>,
+    begin: Instant,
+    /// Why no client can connect any more.
+    failed: Option<std::io::Error>,
+}
+
+impl Participant for SocketLine<'_> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        if output.enable {
+            world.hand.let_go();
+        } else {
+            world.hand.hold_in(&self.relay.scenario.start);
+        }
+        if self.client.is_none() {
+            match accepted(self.relay.listener) {
+                Ok(client) => self.client = client,
+                Err(error) => self.failed = Some(error),
+            }
+        }
+        match self.client.as_mut().map_or(Some(Vec::new()), receive) {
+            Some(bytes) => world.session.send_bytes(&bytes),
+            None => self.client = None,
+        }
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        self.client.take_if(|stream| !send(stream, world.session.last_bytes()));
+        let passed_s = world.ticks() as f64 * self.relay.rig.tick.period_s;
+        let due = self.begin + Duration::from_secs_f64(passed_s);
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        until(self.failed.is_some())
     }
 }
 

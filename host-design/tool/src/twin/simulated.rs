@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant, SystemTime};
 
 use upright_closed_loop::harness::{HarnessError, Target};
-use upright_page::twin::{Properties, SimulatedMachine, World};
+use upright_page::twin::{PoweredMachine, Properties, SimulatedMachine};
 
 use super::dispatcher::{Dispatcher, PICTURE};
 
@@ -34,7 +34,7 @@ pub(super) fn run(
     goes_on: &dyn Fn() -> bool,
 ) -> Result<RunEnd, HarnessError> {
     let epoch = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-    let mut world = World::new(machine, target, properties.clone(), upright, epoch)?;
+    let mut world = PoweredMachine::new(machine, target, properties.clone(), upright, epoch)?;
     let mut last = Instant::now();
     while goes_on() {
         for request in dispatcher.requests(world.now()) {

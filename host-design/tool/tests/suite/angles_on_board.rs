@@ -4,7 +4,7 @@ use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::table::Law;
 use upright_board::{Conditions, Image, Input, SensorDefect};
-use upright_closed_loop::harness::{Harness, Recording};
+use upright_closed_loop::harness::{Recording, World};
 use upright_design::design::design;
 use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
@@ -121,17 +121,17 @@ fn with_defect(
 ) -> (Option<(Fault, Option<u8>)>, usize, u32) {
     let mut board = VirtualBoard::start(image, &Conditions::f405(1), table).unwrap();
     let events = board.events();
-    let mut harness = Harness::new(rig, table, &at_rest_disturbed(rig, Law::Lqr, 1), &mut board).unwrap();
-    let output = harness.raise(None).unwrap();
-    harness.bench.tick(output.drive);
+    let mut world = World::new(rig, table, &at_rest_disturbed(rig, Law::Lqr, 1), &mut board).unwrap();
+    let output = world.raise(None).unwrap();
+    world.bench.tick(output.drive);
     let mut off = None;
     for tick in 0..1000_usize {
         if let Some(input) = tick.checked_sub(100).and_then(&input) {
             events.borrow_mut().push(Event::Input { after: 0, input });
         }
-        let inputs = harness.inputs();
-        let output = harness.session.tick(&inputs).unwrap();
-        harness.bench.tick(output.drive);
+        let inputs = world.inputs();
+        let output = world.session.tick(&inputs).unwrap();
+        world.bench.tick(output.drive);
         if tick >= 100 && !output.enable {
             off = off.or(Some(tick - 99));
             if off.is_some() {
@@ -139,9 +139,9 @@ fn with_defect(
             }
         }
     }
-    let inputs = harness.inputs();
-    let Ok(Answer::Cause(cause)) = harness.session.ask(Request::Cause, &inputs) else { panic!("no cause") };
-    let Ok(Answer::Statistics(statistics)) = harness.session.ask(Request::Statistics, &inputs) else {
+    let inputs = world.inputs();
+    let Ok(Answer::Cause(cause)) = world.session.ask(Request::Cause, &inputs) else { panic!("no cause") };
+    let Ok(Answer::Statistics(statistics)) = world.session.ask(Request::Statistics, &inputs) else {
         panic!("no statistics")
     };
     (cause.map(|cause| (cause.fault, cause.sensor)), off.unwrap_or(0), statistics.rejected_samples)

@@ -13,7 +13,7 @@ use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_board::Image;
 use upright_closed_loop::client::AnyTelemetry;
-use upright_closed_loop::harness::{Harness, HarnessError, Target, with_firmware};
+use upright_closed_loop::harness::{HarnessError, Target, World, with_firmware};
 use upright_design::simulate::Scenario;
 use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::{Compared, VirtualBoard};
@@ -40,7 +40,7 @@ enum Machine {
 
 /// A person at the rig, who stops it as soon as the motor is off.
 struct Person<'h, 't> {
-    harness: &'h mut Harness<'t>,
+    world: &'h mut World<'t>,
     machine: Machine,
     contacts: Contacts,
     hanging: Vec<f64>,
@@ -50,11 +50,11 @@ struct Person<'h, 't> {
 impl Person<'_, '_> {
     fn tick(&mut self, request: Option<Request>) -> Output {
         if let Some(request) = request {
-            self.harness.session.send(request);
+            self.world.session.send(request);
         }
-        let mut inputs = self.harness.inputs();
+        let mut inputs = self.world.inputs();
         inputs.contacts = self.contacts;
-        let output = self.harness.session.tick(&inputs).unwrap();
+        let output = self.world.session.tick(&inputs).unwrap();
         let drive = match (output.drive, self.machine) {
             (_, Machine::Still) => Drive::OFF,
             (Drive::Force(force), Machine::Reversed) => Drive::Force(-force),
@@ -63,11 +63,11 @@ impl Person<'_, '_> {
             (drive, Machine::Sound) => drive,
         };
         if output.enable {
-            self.harness.bench.tick(drive);
+            self.world.bench.tick(drive);
         } else {
             self.hold();
         }
-        while let Some(mut telemetry) = self.harness.session.next_telemetry() {
+        while let Some(mut telemetry) = self.world.session.next_telemetry() {
             (telemetry.cycles, telemetry.worst_cycles) = (0, 0);
             self.telemetry.push(telemetry);
         }
@@ -76,8 +76,8 @@ impl Person<'_, '_> {
 
     /// Holds the links hanging and the cart where it is.
     fn hold(&mut self) {
-        self.hanging[0] = self.harness.bench.state()[0];
-        self.harness.bench.hold(&self.hanging);
+        self.hanging[0] = self.world.bench.state()[0];
+        self.world.bench.hold(&self.hanging);
     }
 
     fn wait(&mut self, ticks: u32) {
@@ -87,11 +87,11 @@ impl Person<'_, '_> {
     }
 
     fn ask(&mut self, request: Request) -> Answer {
-        while self.harness.session.next_reply().is_some() {}
-        let id = self.harness.session.send(request);
-        for _ in 0..self.harness.session.pace().answer_ticks {
+        while self.world.session.next_reply().is_some() {}
+        let id = self.world.session.send(request);
+        for _ in 0..self.world.session.pace().answer_ticks {
             self.tick(None);
-            while let Some((answered, answer)) = self.harness.session.next_reply() {
+            while let Some((answered, answer)) = self.world.session.next_reply() {
                 if answered == id {
                     return answer;
                 }
@@ -110,13 +110,13 @@ impl Person<'_, '_> {
     /// Holds the key for `held_ticks`; returns the number of ticks with the motor on, and how far the cart has moved
     /// (m).
     fn push(&mut self, request: Request, held_ticks: u32) -> (u32, f64) {
-        let from = self.harness.bench.state()[0];
+        let from = self.world.bench.state()[0];
         let (mut on, mut moved) = (0, 0.0);
         for tick in 0..held_ticks + SILENCE_TICKS + 20 {
             let is_held = tick < held_ticks && tick.is_multiple_of(KEY_TICKS);
             if self.tick(is_held.then_some(request)).enable {
                 on += 1;
-                moved = self.harness.bench.state()[0] - from;
+                moved = self.world.bench.state()[0] - from;
             }
         }
         (on, moved)
@@ -125,8 +125,8 @@ impl Person<'_, '_> {
     /// Waits until the last telemetry is current, and the rig has been still for long enough.
     fn settle(&mut self) -> (State, MotorSign, Option<Fault>) {
         self.wait(150);
-        let status = self.harness.session.status();
-        (status.state, status.motor, self.harness.session.fault())
+        let status = self.world.session.status();
+        (status.state, status.motor, self.world.session.fault())
     }
 }
 
@@ -142,16 +142,16 @@ fn bench_of(
 ) -> Result<Vec<AnyTelemetry>, HarnessError> {
     let (rig, table) = rig_and_table("quadruple-paper");
     let scenario = Scenario::at_rest(rig, Law::Lqr);
-    let mut harness = Harness::new(rig, table, &scenario, target)?;
-    for tick in 0.. {
-        harness.by_hand(tick)?;
-        if harness.session.status().signs == Signs::Checked {
+    let mut world = World::new(rig, table, &scenario, target)?;
+    loop {
+        world.by_hand()?;
+        if world.session.status().signs == Signs::Checked {
             break;
         }
     }
-    let hanging = harness.bench.state().to_vec();
+    let hanging = world.bench.state().to_vec();
     let mut person = Person {
-        harness: &mut harness,
+        world: &mut world,
         machine: Machine::Still,
         contacts: Contacts::default(),
         hanging,
@@ -270,9 +270,9 @@ fn it_is_refused_when_links_swing_and_at_an_end_of_the_rail() {
         let place = |person: &mut Person<'_, '_>, index: usize, position: f64| {
             let mut state = person.hanging.clone();
             state[index] = position;
-            person.harness.bench.hold(&state);
-            let inputs = person.harness.inputs();
-            person.harness.session.tick(&inputs).unwrap();
+            person.world.bench.hold(&state);
+            let inputs = person.world.inputs();
+            person.world.session.tick(&inputs).unwrap();
         };
         // A link swings through its rest position.
         for _ in 0..5 {
@@ -289,7 +289,7 @@ fn it_is_refused_when_links_swing_and_at_an_end_of_the_rail() {
         person.settle();
         assert_eq!(person.reasons(ALONG), Inhibits::NOT_HANGING);
         person.hanging[4] = 0.0;
-        let middle = person.harness.bench.state()[0];
+        let middle = person.world.bench.state()[0];
         place(person, 0, 1.95);
         person.settle();
         assert_eq!(person.reasons(ALONG), Inhibits::OFF_CENTRE);

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Duration;
 
+use upright::board::Output;
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
 use upright::protocol::tick_log::OFF;
@@ -11,7 +12,9 @@ use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_board::Image;
-use upright_closed_loop::harness::{Harness, HarnessError, Pins, Target, with_firmware};
+use upright_closed_loop::harness::{
+    Flow, HarnessError, Participant, Pins, Target, World, until, with_firmware,
+};
 use upright_design::design::design;
 use upright_design::plant::ChainParameters;
 use upright_design::reality::real_chain;
@@ -19,8 +22,8 @@ use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_identify::{
-    Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakeError, Shaken, checked_and_hanging,
-    identify, shake_with,
+    Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakingHost, checked_and_hanging, identify,
+    shake_with,
 };
 use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::{Compared, RunPlace, VirtualBoard, run_shaken};
@@ -36,12 +39,24 @@ fn double() -> &'static (Rig, TableValues) {
     rig_and_table("double-quanser-dbpen")
 }
 
-/// The double pendulum with its table, ready to be shaken with the same forces for 20 s.
-fn shaken(target: &mut dyn Target) -> Shaken<'_> {
+/// The double pendulum as it begins to be shaken with the same forces for 20 s, and the host that does it.
+fn shaken(target: &mut dyn Target) -> (World<'_>, ShakingHost) {
     static FEED: OnceLock<Feed> = OnceLock::new();
     let (machine, table) = double();
     let feed = FEED.get_or_init(|| Feed::new(machine, table, 20.0, 1).unwrap());
-    Shaken::begin_with(feed.clone(), machine, table, target, 1).unwrap()
+    begun(feed.clone(), machine, table, target, 1)
+}
+
+fn begun<'t>(
+    feed: Feed,
+    machine: &Rig,
+    table: &TableValues,
+    target: &'t mut dyn Target,
+    seed: u64,
+) -> (World<'t>, ShakingHost) {
+    let mut world = checked_and_hanging(machine, table, target, seed).unwrap();
+    let host = ShakingHost::begin(feed, machine, table, &mut world).unwrap();
+    (world, host)
 }
 
 #[test]
@@ -104,33 +119,61 @@ type Driven = fn(Drive) -> Drive;
 const AS_IT_IS: Driven = |drive| drive;
 const STUCK: Driven = |_| Drive::Duty(1.0);
 
+/// The tick in which a defect begins.
+const ONSET: usize = 2_500;
+
+/// The host that shakes the rig, a defect from the onset on, and what it makes of the motor.
+struct Disturbed {
+    host: ShakingHost,
+    pins: Pinned,
+    motor: Driven,
+    before: Option<Pins>,
+    off: Option<usize>,
+    on_again: bool,
+    cart_m: f64,
+}
+
+impl Participant for Disturbed {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+        let Some(since) = world.ticks().checked_sub(ONSET) else {
+            assert!(output.enable || self.host.log().ticks().len() < 20);
+            return;
+        };
+        if since == 0 {
+            assert_eq!(world.session.status().state, State::Identifying);
+        }
+        if output.enable {
+            output.drive = (self.motor)(output.drive);
+            self.on_again |= self.off.is_some();
+        } else if self.off.is_none() {
+            (self.off, self.cart_m) = (Some(since + 1), world.bench.state()[0]);
+        }
+    }
+
+    fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
+        if let Some(since) = (world.ticks() + 1).checked_sub(ONSET) {
+            let before = self.before.get_or_insert_with(|| pins.clone());
+            (self.pins)(pins, before, since as u32);
+        }
+        Ok(())
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        let is_content = self.host.feed(&mut world.session).is_ok();
+        until(!is_content || self.off.is_some_and(|off| world.ticks() > ONSET + off + 200))
+    }
+}
+
 /// Shakes the double pendulum for 2.5 s, then with a defect. Returns the fault, the ticks from the defect to motor
 /// off, the position of the cart then (m), and whether the motor came on again.
 fn defective(pins: Pinned, motor: Driven) -> (Option<Fault>, u32, f64, bool) {
     let run = with_firmware(&double().1, |target| {
-        let mut shaken = shaken(target);
-        for _ in 0..2_500 {
-            assert!(shaken.tick(|_| (), AS_IT_IS).unwrap().enable || shaken.log().ticks().len() < 20);
-        }
-        assert_eq!(shaken.harness.session.status().state, State::Identifying);
-        let before = shaken.harness.inputs();
-        let (mut off, mut on_again, mut cart_m) = (None, false, 0.0);
-        for tick in 0..2_000 {
-            match shaken.tick(|now| pins(now, &before, tick), motor) {
-                Ok(output) if output.enable => on_again |= off.is_some(),
-                Ok(_) => {
-                    if off.is_none() {
-                        (off, cart_m) = (Some(tick + 1), shaken.harness.bench.state()[0]);
-                    }
-                }
-                Err(ShakeError::Identify(_)) => break,
-                Err(error) => panic!("{error}"),
-            }
-            if off.is_some_and(|off| tick > off + 200) {
-                break;
-            }
-        }
-        (shaken.harness.session.fault(), off.unwrap_or(u32::MAX), cart_m, on_again)
+        let (mut world, host) = shaken(target);
+        let (before, off, on_again, cart_m) = (None, None, false, 0.0);
+        let mut disturbed = Disturbed { host, pins, motor, before, off, on_again, cart_m };
+        world.run(ONSET + 2_000, &mut [&mut disturbed]).unwrap();
+        let off = disturbed.off.map_or(u32::MAX, |off| off as u32);
+        (world.session.fault(), off, disturbed.cart_m, disturbed.on_again)
     });
     run.unwrap()
 }
@@ -186,27 +229,29 @@ fn no_defect_is_missed_while_the_rig_is_shaken() {
     assert_eq!(defective(|_, _, _| (), AS_IT_IS), (None, u32::MAX, 0.0, false));
 }
 
+/// Counts the ticks with the motor on.
+struct OnTicks(u32);
+
+impl Participant for OnTicks {
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        self.0 += u32::from(world.output().enable);
+        until(false)
+    }
+}
+
 #[test]
 fn a_silent_host_and_the_stop_key_end_it() {
     let ended = |stop: bool| {
         with_firmware(&double().1, |target| {
-            let mut shaken = shaken(target);
-            (0..2_500).for_each(|_| {
-                shaken.tick(|_| (), AS_IT_IS).unwrap();
-            });
+            let (mut world, mut host) = shaken(target);
+            world.run(ONSET, &mut [&mut host]).unwrap();
             if stop {
-                shaken.harness.session.send(Request::Disarm);
+                world.session.send(Request::Disarm);
             }
-            let mut on = 0;
-            for _ in 0..6_000 {
-                // No more forces are sent.
-                let inputs = shaken.harness.inputs();
-                let output = shaken.harness.session.tick(&inputs).unwrap();
-                shaken.harness.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
-                on += u32::from(output.enable);
-            }
-            let session = &shaken.harness.session;
-            (on, session.status().state, session.fault(), shaken.harness.bench.state()[0])
+            // No more forces are sent.
+            let mut on = OnTicks(0);
+            world.run(6_000, &mut [&mut on]).unwrap();
+            (on.0, world.session.status().state, world.session.fault(), world.bench.state()[0])
         })
         .unwrap()
     };
@@ -224,11 +269,10 @@ fn is_shaken_to_the_end(rig: &Rig, file: &Rig, seconds: f64, seed: u64) -> bool 
     let table = crate::published::table(rig);
     let feed = Feed::new(file, &table, seconds, seed).unwrap();
     let outcome = with_firmware(&table, |target| {
-        let mut shaken = Shaken::begin_with(feed, rig, &table, target, seed).unwrap();
-        while !shaken.is_over() && shaken.harness.session.fault().is_none() {
-            shaken.tick(|_| (), |drive| drive).unwrap();
-        }
-        shaken.harness.session.fault().is_none()
+        let (mut world, mut host) = begun(feed, rig, &table, target, seed);
+        world.run(usize::MAX, &mut [&mut host]).unwrap();
+        host.finish().unwrap();
+        world.session.fault().is_none()
     });
     outcome.unwrap()
 }
@@ -264,23 +308,31 @@ fn the_rig_of_the_first_hour_is_found_to_weigh_what_its_file_says() {
     }
 }
 
+/// Counts the bytes on the line: all, and the most in a tick.
+struct LineBytes([usize; 2]);
+
+impl Participant for LineBytes {
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        let sent = world.session.last_bytes().len();
+        self.0 = [self.0[0] + sent, self.0[1].max(sent)];
+        until(false)
+    }
+}
+
 #[test]
 fn the_log_of_four_links_fits_the_line() {
     let (machine, table) = rig_and_table("quadruple-paper").clone();
     let log = with_firmware(&table, |target| {
-        let mut shaken = Shaken::begin(&machine, &table, target, 5.0, 1).unwrap();
-        let (mut bytes, mut most) = (0, 0);
-        for _ in 0..2_000 {
-            shaken.tick(|_| (), AS_IT_IS).unwrap();
-            let sent = shaken.harness.session.last_bytes().len();
-            (bytes, most) = (bytes + sent, most.max(sent));
-        }
-        assert_eq!(shaken.log().lost(), 0);
+        let feed = Feed::new(&machine, &table, 5.0, 1).unwrap();
+        let (mut world, mut host) = begun(feed, &machine, &table, target, 1);
+        let mut line = LineBytes([0; 2]);
+        world.run(2_000, &mut [&mut host, &mut line]).unwrap();
+        assert_eq!((host.log().lost(), world.ticks()), (0, 2_000));
         // 10 bits per byte at 460 800 Bd.
-        let per_second = f64::from(bytes as u32) / 2.0;
+        let per_second = f64::from(line.0[0] as u32) / 2.0;
         assert!((13_000.0..0.6 * 46_080.0).contains(&per_second), "{per_second} bytes per second");
         println!("{per_second} bytes per second with telemetry");
-        shaken.log().clone()
+        host.log().clone()
     });
     let log: Log = log.unwrap();
     assert!(log.ticks().len() > 1_900);
@@ -291,7 +343,7 @@ fn the_log_of_four_links_fits_the_line() {
 fn over_line(host: &(Rig, TableValues), is_lost: fn(u32) -> bool) -> (Result<Log, LineError>, u32) {
     let (machine, table) = double();
     with_firmware(table, |target| {
-        let mut harness = checked_and_hanging(machine, table, target, 1).unwrap();
+        let mut world = checked_and_hanging(machine, table, target, 1).unwrap();
         let since_1970 = |tick: u32| {
             Duration::from_secs(1_800_000_000)
                 + Duration::from_secs_f64(f64::from(tick) * machine.tick.period_s)
@@ -303,17 +355,17 @@ fn over_line(host: &(Rig, TableValues), is_lost: fn(u32) -> bool) -> (Result<Log
             if ended.is_none() {
                 let done = line.poll(now);
                 let arrived = if is_lost(tick) { Vec::new() } else { line.take_outgoing() };
-                harness.session.send_bytes(&arrived);
+                world.session.send_bytes(&arrived);
                 ended = done.err().map(Err).or_else(|| line.is_over().then_some(Ok(())));
             }
-            let inputs = harness.inputs();
-            let output = harness.session.tick(&inputs).unwrap();
+            let inputs = world.inputs();
+            let output = world.session.tick(&inputs).unwrap();
             on += u32::from(ended.is_some() && output.enable);
-            harness.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
+            world.bench.tick(if output.enable { output.drive } else { Drive::Force(0.0) });
             if ended.is_none() && !is_lost(tick) {
-                ended = line.receive(harness.session.last_bytes(), now).err().map(Err);
+                ended = line.receive(world.session.last_bytes(), now).err().map(Err);
             }
-            harness.session.forget_received();
+            world.session.forget_received();
         }
         let ended = ended.expect("it ends");
         (ended.and_then(|()| Ok(line.finish()?)), on)
@@ -345,15 +397,15 @@ fn a_machine_that_is_not_the_files_or_is_not_checked_is_not_shaken() {
     let (machine, table) = double();
     let refused = with_firmware(table, |target| {
         let scenario = Scenario::at_rest(machine, Law::Lqr);
-        let mut harness = Harness::new(machine, table, &scenario, target).unwrap();
+        let mut world = World::new(machine, table, &scenario, target).unwrap();
         let mut line = OverLine::new(machine, table, 5.0, 1, Duration::from_secs(1)).unwrap();
         (0..1_000).find_map(|tick| {
             let now = Duration::from_secs(1) + Duration::from_millis(tick);
             line.poll(now).unwrap();
-            harness.session.send_bytes(&line.take_outgoing());
-            let inputs = harness.inputs();
-            harness.session.tick(&inputs).unwrap();
-            line.receive(harness.session.last_bytes(), now).err()
+            world.session.send_bytes(&line.take_outgoing());
+            let inputs = world.inputs();
+            world.session.tick(&inputs).unwrap();
+            line.receive(world.session.last_bytes(), now).err()
         })
     });
     let refused = refused.unwrap().expect("it is refused").to_string();

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde_json::json;
 use upright::table::Law;
-use upright_closed_loop::harness::{Harness, with_firmware};
+use upright_closed_loop::harness::{World, with_firmware};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
@@ -39,7 +39,7 @@ const LONGEST_S: f64 = 0.02;
 
 /// A board under power, in real time; on a busy machine its time waits for the browser.
 struct Board<'a, 't> {
-    harness: Harness<'t>,
+    world: World<'t>,
     rig: &'a Rig,
     output: upright::board::Output,
     last: Instant,
@@ -61,11 +61,11 @@ impl Board<'_, '_> {
             } else {
                 upright::control::actuator::Drive::Force(0.0)
             };
-            self.harness.bench.tick(drive);
-            let inputs = self.harness.inputs();
-            self.output = self.harness.session.tick(&inputs).unwrap();
-            sent.extend_from_slice(self.harness.session.last_bytes());
-            self.harness.session.forget_received();
+            self.world.bench.tick(drive);
+            let inputs = self.world.inputs();
+            self.output = self.world.session.tick(&inputs).unwrap();
+            sent.extend_from_slice(self.world.session.last_bytes());
+            self.world.session.forget_received();
             self.t_s += self.rig.tick.period_s;
         }
         let inside = browser.inside.take();
@@ -73,7 +73,7 @@ impl Board<'_, '_> {
         browser.inside = inside;
         if self.is_connected {
             let bytes: Vec<u8> = serde_json::from_value(received).unwrap();
-            self.harness.session.send_bytes(&bytes);
+            self.world.session.send_bytes(&bytes);
         }
     }
 
@@ -105,10 +105,10 @@ fn with_board(firmware_is_its_own: bool, act: impl FnOnce(&mut Browser, &mut Boa
     );
     let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, Law::Lqr) };
     with_firmware(&table, |firmware| {
-        let mut harness = Harness::new(&rig, &table, &scenario, firmware).unwrap();
-        let output = harness.raise(None).unwrap();
+        let mut world = World::new(&rig, &table, &scenario, firmware).unwrap();
+        let output = world.raise(None).unwrap();
         let mut board = Board {
-            harness,
+            world,
             rig: &rig,
             output,
             last: Instant::now(),

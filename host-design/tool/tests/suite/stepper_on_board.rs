@@ -10,7 +10,7 @@ use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
 use upright::table::{DriveMap, Law};
 use upright_board::{Conditions, Image, Input, Pulse, Time, UNITS_PER_MICROSECOND as US, seconds};
-use upright_closed_loop::harness::{Harness, RailEnds, Recording, record};
+use upright_closed_loop::harness::{RailEnds, Recording, World, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
@@ -291,23 +291,23 @@ fn a_stepper_finds_both_switches_of_its_rail_on_the_board() {
     // Negative control: without the high one, homing ends where it should have been.
     for (has_high, wanted) in [(true, Homing::Homed), (false, Homing::WrongTravel)] {
         let (mut board, log) = counted(&image, table, |_, _, _| None);
-        let mut harness = Harness::new(rig, table, &Scenario::at_rest(rig, Law::Lqr), &mut board).unwrap();
-        harness.bench.hold(&[0.05, 0.0, PI, 0.0]);
-        harness.session.send(Request::HomeRail);
+        let mut world = World::new(rig, table, &Scenario::at_rest(rig, Law::Lqr), &mut board).unwrap();
+        world.bench.hold(&[0.05, 0.0, PI, 0.0]);
+        world.session.send(Request::HomeRail);
         let (mut homing, mut ticks) = (None, 0);
         let is_homing = |homing| matches!(homing, Some(Homing::Touch { .. } | Homing::HoldStill));
         while ticks < 100 || ticks < 6000 && is_homing(homing) {
-            let mut inputs = harness.inputs();
-            ends.press(harness.bench.state()[0], &mut inputs.contacts);
+            let mut inputs = world.inputs();
+            ends.press(world.bench.state()[0], &mut inputs.contacts);
             inputs.contacts.limit_high &= has_high;
-            let output = harness.session.tick(&inputs).unwrap();
-            harness.bench.tick(output.drive);
-            while let Some(telemetry) = harness.session.next_telemetry() {
+            let output = world.session.tick(&inputs).unwrap();
+            world.bench.tick(output.drive);
+            while let Some(telemetry) = world.session.next_telemetry() {
                 homing = Some(telemetry.homing);
             }
             ticks += 1;
         }
-        let cart_m = harness.bench.state()[0];
+        let cart_m = world.bench.state()[0];
         println!("{homing:?} after {ticks} ticks, at {cart_m} m");
         assert_eq!(homing, Some(wanted));
         assert!(!has_high || cart_m.abs() < 2e-3, "{cart_m}");

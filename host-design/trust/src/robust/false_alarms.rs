@@ -6,7 +6,7 @@ use upright::protocol::message::{Answer, Request};
 use upright::table::Law;
 
 use crate::verify::{VerifyError, at_rest_disturbed, chain, moved_setpoint_m};
-use upright_closed_loop::harness::{Harness, HarnessError, with_firmware};
+use upright_closed_loop::harness::{Flow, HarnessError, Participant, World, until, with_firmware};
 use upright_design::reality::{corner_machine, corners_of, drawn_machine};
 use upright_design::rig::Rig;
 use upright_design::study::Study;
@@ -120,79 +120,68 @@ pub fn balance(
 ) -> Result<Healthy, HarnessError> {
     let scenario = at_rest_disturbed(machine, law, seed);
     with_firmware(table, |target| {
-        let mut harness = Harness::new(machine, table, &scenario, target)?;
-        match harness.raise(None) {
-            Ok(output) => {
-                harness.bench.tick(output.drive);
-                balanced(machine, table, &mut harness, seconds)
-            }
-            // The motor was turned off before the machine balanced.
-            Err(error) => match harness.session.fault() {
-                Some(fault) => {
-                    Ok(Healthy { balanced_s: 0.0, fault: Some(fault.to_string()), rejected: 0, closest: 0.0 })
-                }
-                None => Err(error),
-            },
+        let mut world = World::new(machine, table, &scenario, target)?;
+        let mut watched = HealthyRun::new(machine, table);
+        if let Err(error) = world.raise(None) {
+            // The motor may have been turned off before the machine balanced.
+            watched.found.fault = Some(world.session.fault().ok_or(error)?.to_string());
+            return Ok(watched.found);
         }
+        world.run(watched.ticks(seconds), &mut [&mut watched])?;
+        // It goes on balancing until the answer arrives.
+        if let Answer::Statistics(statistics) = world.ask(Request::Statistics)? {
+            watched.found.rejected = statistics.rejected_samples;
+        }
+        Ok(watched.found)
     })?
 }
 
-fn balanced(
-    rig: &Rig,
-    table: &TableValues,
-    harness: &mut Harness<'_>,
-    seconds: f64,
-) -> Result<Healthy, HarnessError> {
-    let ticks = |seconds: f64| (seconds / rig.tick.period_s) as u64;
-    let (side, keep_alive) = (ticks(SIDE_S).max(1), ticks(KEEP_ALIVE.as_secs_f64()).max(1));
-    let setpoint_m = moved_setpoint_m(table) as f32;
-    let thresholds = &table.thresholds;
-    let largest = if thresholds.survives_pushes() { &thresholds.push } else { &thresholds.innovation };
-    let mut found = Healthy { balanced_s: 0.0, fault: None, rejected: 0, closest: 0.0 };
-    for number in 0..ticks(seconds) {
-        if number % side == 0 {
-            let sign = if (number / side).is_multiple_of(2) { 1.0 } else { -1.0 };
-            harness.session.send(Request::Setpoint(sign * setpoint_m));
-        } else if number % keep_alive == 0 {
-            harness.session.send(Request::KeepAlive);
-        }
-        tick(harness)?;
-        while harness.session.next_reply().is_some() {}
-        while let Some(telemetry) = harness.session.next_telemetry() {
-            for (innovation, largest) in telemetry.innovation.iter().zip(largest) {
-                found.closest = found.closest.max(innovation.abs() / largest);
-            }
-        }
-        found.fault = harness.session.fault().map(|fault| fault.to_string());
-        if found.fault.is_some() {
-            break;
-        }
-        found.balanced_s = (number + 1) as f64 * rig.tick.period_s;
-    }
-    found.rejected = rejected(harness)?;
-    Ok(found)
+/// A host that moves the set-point, and watches the firmware's telemetry.
+struct HealthyRun<'a> {
+    /// Largest innovation of each sensor that is no fault.
+    largest: &'a [f32],
+    setpoint_m: f32,
+    period_s: f64,
+    found: Healthy,
 }
 
-/// One tick of firmware and rig.
-fn tick(harness: &mut Harness<'_>) -> Result<(), HarnessError> {
-    let inputs = harness.inputs();
-    let output = harness.session.tick(&inputs)?;
-    harness.bench.tick(output.drive);
-    Ok(())
+impl<'a> HealthyRun<'a> {
+    fn new(rig: &Rig, table: &'a TableValues) -> Self {
+        let thresholds = &table.thresholds;
+        let largest = if thresholds.survives_pushes() { &thresholds.push } else { &thresholds.innovation };
+        let found = Healthy { balanced_s: 0.0, fault: None, rejected: 0, closest: 0.0 };
+        Self { largest, setpoint_m: moved_setpoint_m(table) as f32, period_s: rig.tick.period_s, found }
+    }
+
+    fn ticks(&self, seconds: f64) -> usize {
+        (seconds / self.period_s) as usize
+    }
 }
 
-/// Number of measurements that the firmware has rejected so far; the rig goes on balancing until the answer arrives.
-fn rejected(harness: &mut Harness<'_>) -> Result<u32, HarnessError> {
-    let id = harness.session.send(Request::Statistics);
-    for _ in 0..harness.session.pace().answer_ticks {
-        tick(harness)?;
-        while let Some((answered, answer)) = harness.session.next_reply() {
-            if let (true, Answer::Statistics(statistics)) = (answered == id, answer) {
-                return Ok(statistics.rejected_samples);
+impl Participant for HealthyRun<'_> {
+    fn say(&mut self, world: &World<'_>) -> Option<Request> {
+        let (side, keep_alive) = (self.ticks(SIDE_S).max(1), self.ticks(KEEP_ALIVE.as_secs_f64()).max(1));
+        let tick = world.ticks();
+        if tick.is_multiple_of(side) {
+            let sign = if (tick / side).is_multiple_of(2) { 1.0 } else { -1.0 };
+            return Some(Request::Setpoint(sign * self.setpoint_m));
+        }
+        tick.is_multiple_of(keep_alive).then_some(Request::KeepAlive)
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        while let Some(telemetry) = world.session.next_telemetry() {
+            for (innovation, largest) in telemetry.innovation.iter().zip(self.largest) {
+                self.found.closest = self.found.closest.max(innovation.abs() / largest);
             }
         }
+        self.found.fault = world.session.fault().map(|fault| fault.to_string());
+        if self.found.fault.is_some() {
+            return until(true);
+        }
+        self.found.balanced_s = world.ticks() as f64 * self.period_s;
+        until(false)
     }
-    Err(HarnessError::NoAnswer(Request::Statistics))
 }
 
 /// The mean of the Poisson distribution for which `seen` or fewer events have a probability of 5 %: the largest

@@ -5,7 +5,7 @@ use upright::board::Output;
 use upright::protocol::message::Request;
 use upright::table::Law;
 
-use upright_closed_loop::harness::{Harness, HarnessError, Host, with_firmware};
+use upright_closed_loop::harness::{Flow, HarnessError, Host, Participant, World, until, with_firmware};
 use upright_design::plant::{absolute_angles, without_turns};
 use upright_design::rig::{CartInput, Rig};
 use upright_design::simulate::{
@@ -144,51 +144,57 @@ pub(super) fn trial_from_power_up(
     horizon: &Horizon,
 ) -> Result<Outcome, HarnessError> {
     with_firmware(table, |target| {
-        let mut harness = Harness::new(rig, table, scenario, target)?;
-        match harness.raise(Some(scenario.target_m(0.0) as f32)) {
-            Ok(output) => let_go(rig, &mut harness, output, scenario, horizon),
+        let mut world = World::new(rig, table, scenario, target)?;
+        match world.raise(Some(scenario.target_m(0.0) as f32)) {
+            Ok(_) => {}
             Err(HarnessError::NotBalancing(_)) => {
-                let kind = harness.session.fault().map_or(FallKind::NotArmed, FallKind::MotorOff);
-                Ok(Outcome::NOTHING_SEEN.ended(Some(Fall { at_s: 0.0, kind })))
+                let kind = world.session.fault().map_or(FallKind::NotArmed, FallKind::MotorOff);
+                return Ok(Outcome::NOTHING_SEEN.ended(Some(Fall { at_s: 0.0, kind })));
             }
-            Err(error) => Err(error),
+            Err(error) => return Err(error),
         }
+        world.session.send(Request::Telemetry((TELEMETRY_S / rig.tick.period_s).max(1.0) as u16));
+        let mut watched = UntilFall::new(rig, scenario, horizon);
+        let mut host = Host::new(scenario, rig.tick.period_s, world.session.pace().command_ticks);
+        world.run(ticks(rig, scenario)? + 1, &mut [&mut host, &mut watched])?;
+        Ok(watched.outcome.ended(watched.fall))
     })?
 }
 
-/// Runs `scenario` with a firmware that balances; `output` is its first.
-fn let_go(
-    rig: &Rig,
-    harness: &mut Harness<'_>,
-    mut output: Output,
-    scenario: &Scenario,
-    horizon: &Horizon,
-) -> Result<Outcome, HarnessError> {
-    let mut host = Host::new(scenario, rig.tick.period_s, harness.session.pace().command_ticks);
-    let mut outcome = Outcome::NOTHING_SEEN;
-    harness.session.send(Request::Telemetry((TELEMETRY_S / rig.tick.period_s).max(1.0) as u16));
-    for tick in 0..=ticks(rig, scenario)? {
-        let t = tick as f64 * rig.tick.period_s;
-        let target = scenario.target_m(t);
-        let state = harness.bench.state().to_vec();
-        let force = harness.bench.tick(output.drive);
-        outcome.see(
-            rig,
-            horizon,
-            &Sample { t, target, setpoint: target, requested: force, force, state: &state, estimate: &[] },
-        );
-        let off = harness.session.fault().map(|fault| Fall { at_s: t, kind: FallKind::MotorOff(fault) });
-        if let Some(fall) = off.or_else(|| Fall::of(rig, t, &without_turns(&state))) {
-            return Ok(outcome.ended(Some(fall)));
-        }
-        if let Some(request) = host.request(tick) {
-            harness.session.send(request);
-        }
-        let inputs = harness.inputs();
-        output = harness.session.tick(&inputs)?;
-        harness.session.forget_received();
+/// Watches a firmware that balances until the rig falls, or its motor is turned off.
+struct UntilFall<'a> {
+    rig: &'a Rig,
+    scenario: &'a Scenario,
+    horizon: &'a Horizon,
+    outcome: Outcome,
+    t: f64,
+    /// The state at the beginning of the tick.
+    state: Vec<f64>,
+    fall: Option<Fall>,
+}
+
+impl<'a> UntilFall<'a> {
+    fn new(rig: &'a Rig, scenario: &'a Scenario, horizon: &'a Horizon) -> Self {
+        let (outcome, state) = (Outcome::NOTHING_SEEN, vec![0.0; rig.states()]);
+        Self { rig, scenario, horizon, outcome, t: 0.0, state, fall: None }
     }
-    Ok(outcome)
+}
+
+impl Participant for UntilFall<'_> {
+    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
+        self.t = world.ticks() as f64 * self.rig.tick.period_s;
+        self.state.copy_from_slice(world.bench.state());
+        let off = world.session.fault().map(|fault| Fall { at_s: self.t, kind: FallKind::MotorOff(fault) });
+        self.fall = off.or_else(|| Fall::of(self.rig, self.t, &without_turns(&self.state)));
+    }
+
+    fn saw(&mut self, world: &mut World<'_>) -> Flow {
+        let (t, state, force) = (self.t, self.state.as_slice(), world.force_n());
+        let target = self.scenario.target_m(t);
+        let sample = Sample { t, target, setpoint: target, requested: force, force, state, estimate: &[] };
+        self.outcome.see(self.rig, self.horizon, &sample);
+        until(self.fall.is_some())
+    }
 }
 
 /// [`trial`] for each of these cases, several in lockstep.

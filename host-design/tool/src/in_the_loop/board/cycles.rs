@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::supervision::fault::Fault;
 use upright_board::{Conditions, Image, TickCost, TickPart, Time, UNITS_PER_MICROSECOND};
-use upright_closed_loop::harness::{Harness, HarnessError, record};
+use upright_closed_loop::harness::{HarnessError, World, record};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -222,20 +222,16 @@ fn balance(
     board: &mut VirtualBoard,
     balanced: &mut usize,
 ) -> Result<Option<Fault>, HarnessError> {
-    let mut harness = Harness::new(rig, table, scenario, board)?;
+    let mut world = World::new(rig, table, scenario, board)?;
     if table.observer.is_none() {
         // It never balances.
-        let inputs = harness.inputs();
-        (0..1000).try_for_each(|_| harness.session.tick(&inputs).map(drop))?;
+        let inputs = world.inputs();
+        (0..1000).try_for_each(|_| world.session.tick(&inputs).map(drop))?;
         return Err(HarnessError::FullState);
     }
-    let mut output = harness.raise(None)?;
-    *balanced = 1;
-    for _ in 0..(scenario.duration_s / rig.tick.period_s) as usize {
-        harness.bench.tick(output.drive);
-        let inputs = harness.inputs();
-        output = harness.session.tick(&inputs)?;
-        *balanced += 1;
-    }
-    Ok(harness.session.fault())
+    world.raise(None)?;
+    let ticks = (scenario.duration_s / rig.tick.period_s) as usize;
+    world.run(ticks, &mut [])?;
+    *balanced = 1 + world.ticks();
+    Ok(world.session.fault())
 }

@@ -1,0 +1,103 @@
+//! The equilibria to which a person tells the firmware to go.
+
+use upright::protocol::message::Request;
+use upright::supervision::supervisor::State;
+use upright::table::Equilibrium;
+
+use super::hand::Hand;
+use super::operator::RETRY_S;
+use super::session::Session;
+use upright_design::rig::Rig;
+use upright_design::simulate::{Bench, Scenario};
+
+/// Time before the links are raised again at which a hand takes hold of the rig (s): enough to come from either end of
+/// the rail.
+const PUT_BACK_S: f64 = 5.0;
+
+/// Goals, each of which is requested from its tick on, and again until its motion begins: the firmware refuses it while
+/// a link leans or the cart moves. Before a lowered rig is raised again, a hand stills its links and pushes the cart to
+/// 0.
+#[derive(Default)]
+pub struct Goals {
+    /// Each with the tick from which it is requested.
+    goals: Vec<(usize, Equilibrium)>,
+    /// Ticks between two requests, and those before a goal in which a hand puts the rig back.
+    retry_ticks: usize,
+    put_back_ticks: usize,
+    /// The hand that puts it back.
+    hand: Option<Hand>,
+    /// The last tick in which the next goal was requested.
+    asked: Option<usize>,
+    begun: Vec<usize>,
+}
+
+impl Goals {
+    /// The goals of `scenario`, whose time 0 is the tick in which the rig is let go.
+    pub fn of(rig: &Rig, scenario: &Scenario) -> Self {
+        let ticks = |seconds: f64| seconds / rig.tick.period_s;
+        let goals = scenario.goals.iter().map(|goal| (ticks(goal.at_s).round() as usize, goal.to));
+        let mut hand = Hand::hanging(rig);
+        hand.let_go();
+        Self {
+            goals: goals.collect(),
+            retry_ticks: ticks(RETRY_S).max(1.0) as usize,
+            put_back_ticks: ticks(PUT_BACK_S) as usize,
+            hand: Some(hand),
+            ..Self::default()
+        }
+    }
+
+    /// The tick from which this goal is requested, if there are so many.
+    pub fn tick_of(&self, index: usize) -> Option<usize> {
+        self.goals.get(index).map(|(tick, _)| *tick)
+    }
+
+    /// The tick in which the motion to each goal began, for the goals whose motion has begun.
+    pub fn begun(&self) -> &[usize] {
+        &self.begun
+    }
+
+    /// The request of this tick, if there is one; moves a rig that is put back.
+    pub(super) fn request(
+        &mut self,
+        tick: usize,
+        session: &Session<'_>,
+        bench: &mut Bench,
+    ) -> Option<Request> {
+        let state = session.status().state;
+        if matches!(state, State::Raising | State::Lowering)
+            && let Some(asked) = self.asked.take()
+        {
+            self.begun.push(asked + session.pace().command_ticks);
+        }
+        let &(at, to) = self.goals.get(self.begun.len())?;
+        if let Some(hand) = &mut self.hand {
+            let ahead = at.saturating_sub(tick);
+            let puts_back = state == State::Calibrated
+                && to != Equilibrium::HANGING
+                && (1..=self.put_back_ticks).contains(&ahead);
+            put_back(hand, bench, puts_back);
+        }
+        let rests = match state {
+            State::Balancing | State::Holding => true,
+            State::Calibrated => to != Equilibrium::HANGING,
+            _ => false,
+        };
+        let asks = rests && tick.checked_sub(at).is_some_and(|since| since.is_multiple_of(self.retry_ticks));
+        asks.then(|| {
+            self.asked = Some(tick);
+            Request::Goto(to)
+        })
+    }
+}
+
+/// The hand moves the hanging rig by one tick's step towards rest with the cart at 0, and lets go of it there.
+fn put_back(hand: &mut Hand, bench: &mut Bench, puts_back: bool) {
+    if !puts_back {
+        return hand.let_go();
+    }
+    hand.take_hold(bench.state());
+    if !hand.push_to(0.0) {
+        bench.hold(hand.held());
+    }
+}
