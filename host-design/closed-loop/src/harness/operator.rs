@@ -2,7 +2,6 @@
 //! until the motor is on, or lets them hang for the swing-up.
 
 use upright::board::Output;
-use upright::control::actuator::Drive;
 use upright::protocol::KEEP_ALIVE;
 use upright::protocol::message::Request;
 use upright::supervision::jog::MotorSign;
@@ -12,7 +11,7 @@ use upright::table::Equilibrium;
 
 use super::hand::Hand;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Begin, Bench, Scenario, SimulationError};
+use upright_design::simulate::{Begin, Bench, Scenario};
 
 /// What the operator knows of the firmware, from its telemetry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,9 +31,6 @@ pub(super) struct Operator {
     turn_on: Request,
     takes_pulses: bool,
     start: Vec<f64>,
-    /// A second rig, simulated while the motor pushes the cart: the random numbers and the state of the run's own rig
-    /// must not depend on how it was started.
-    pushed: Bench,
     /// Ticks between two tries of the same request.
     retry_ticks: usize,
     /// Ticks between two commands of a key that is held.
@@ -63,14 +59,9 @@ pub(super) const RETRY_S: f64 = 0.05;
 impl Operator {
     /// An operator who moves `rig` from hanging to the start of `scenario`, and lets go there: when the firmware
     /// balances, or for a swing-up when it begins to raise the links.
-    ///
-    /// # Errors
-    /// [`SimulationError`] if the plant cannot be built.
-    pub(super) fn new(rig: &Rig, scenario: &Scenario) -> Result<Self, SimulationError> {
-        let undisturbed =
-            Scenario { force_noise_n: 0.0, torque_noise_n_m: 0.0, force_offset_n: 0.0, ..scenario.clone() };
+    pub(super) fn new(rig: &Rig, scenario: &Scenario) -> Self {
         let ticks = |seconds: f64| (seconds / rig.tick.period_s).ceil() as usize;
-        Ok(Self {
+        Self {
             doing: Doing::Home,
             turn_on: match scenario.begin {
                 Begin::ByHand => Request::Arm,
@@ -78,12 +69,11 @@ impl Operator {
             },
             takes_pulses: rig.actuator.pulses().is_some(),
             start: scenario.start.clone(),
-            pushed: Bench::new(rig, &undisturbed)?,
             retry_ticks: ticks(RETRY_S),
             key_ticks: ticks(KEEP_ALIVE.as_secs_f64()),
             // The firmware asks for a quarter of arm_time_s.
             settle_ticks: ticks(0.5 * rig.limits.arm_time_s),
-        })
+        }
     }
 
     /// Whether the firmware balances or raises the links, with this output and as far as its telemetry says. A drive
@@ -92,14 +82,14 @@ impl Operator {
         if self.takes_pulses { status.state.controls() } else { output.enable && self.doing != Doing::Push }
     }
 
-    /// What the operator does in tick number `tick`, when `output` was the firmware's last output: moves the rig with
-    /// `hand`, and returns the request. Nothing once the controller commands the motor and the hand has let go.
+    /// What the operator does in tick number `tick`, when `output` was the firmware's last output: moves the rig on
+    /// `bench` with `hand`, and returns the request. Nothing once the controller commands the motor and the hand has let go.
     pub(super) fn act(
         &mut self,
         tick: usize,
         status: &Status,
         output: &Output,
-        hand: &mut Hand,
+        (hand, bench): (&mut Hand, &mut Bench),
     ) -> Option<Request> {
         if status.state.controls() {
             return None;
@@ -121,14 +111,13 @@ impl Operator {
             }
             Doing::Settle(0) => {
                 self.doing = Doing::Push;
-                self.pushed.hold(hand.held());
                 None
             }
             Doing::Settle(ticks) => {
                 self.doing = Doing::Settle(ticks - 1);
                 None
             }
-            Doing::Push => self.push(tick, status, output, hand),
+            Doing::Push => self.push(tick, status, output, (hand, bench)),
             Doing::Raise => {
                 if hand.put(&self.start) {
                     self.doing = Doing::TurnOn;
@@ -164,22 +153,24 @@ impl Operator {
         }
     }
 
-    /// Lets the motor push the cart with all links free, and holds the key until the motor's sign is known.
-    fn push(&mut self, tick: usize, status: &Status, output: &Output, hand: &mut Hand) -> Option<Request> {
-        // A motor that is off turns freely.
-        let drive = if output.enable { output.drive } else { Drive::Force(0.0) };
-        self.pushed.tick(drive);
-        hand.take(self.pushed.state());
-        match status.motor {
-            MotorSign::Unchecked if tick.is_multiple_of(self.key_ticks) => {
-                Some(Request::Jog { along: false })
-            }
-            MotorSign::Checked if status.state == State::Calibrated => {
-                hand.stop();
-                self.doing = Doing::Raise;
-                None
-            }
-            _ => None,
+    /// Lets the motor push the cart with all links free, and holds the key until the motor's sign is known. The
+    /// disturbances of the run begin later, so that they do not depend on how it was started.
+    fn push(
+        &mut self,
+        tick: usize,
+        status: &Status,
+        output: &Output,
+        (hand, bench): (&mut Hand, &mut Bench),
+    ) -> Option<Request> {
+        hand.let_go();
+        bench.disturb(false);
+        if status.motor == MotorSign::Checked && status.state == State::Calibrated {
+            bench.tick(output.drive);
+            bench.disturb(true);
+            hand.take_hold(bench.state());
+            self.doing = Doing::Raise;
         }
+        let presses = status.motor == MotorSign::Unchecked && tick.is_multiple_of(self.key_ticks);
+        presses.then_some(Request::Jog { along: false })
     }
 }

@@ -132,7 +132,7 @@ impl<'t> World<'t> {
             bench: Bench::new(rig, scenario)?,
             hand: Hand::hanging(rig),
             goals: Goals::default(),
-            operator: Operator::new(rig, scenario)?,
+            operator: Operator::new(rig, scenario),
             output: Output::OFF,
             force_n: 0.0,
             counters: vec![0; table.sensors()],
@@ -232,7 +232,9 @@ impl<'t> World<'t> {
     /// [`HarnessError`] if the firmware does not answer.
     pub fn by_hand(&mut self) -> Result<Output, HarnessError> {
         let status = self.session.status();
-        if let Some(request) = self.operator.act(self.ticks, &status, &self.output, &mut self.hand) {
+        if let Some(request) =
+            self.operator.act(self.ticks, &status, &self.output, (&mut self.hand, &mut self.bench))
+        {
             self.session.send(request);
         }
         self.tick(&mut []).map(|_| self.output)

@@ -28,6 +28,7 @@ pub struct Bench {
     force_noise_n: f64,
     torque_noise_n_m: f64,
     force_offset: f64,
+    is_disturbed: bool,
     push_n: f64,
     pull_n_m: Vec<f64>,
     torques: Vec<f64>,
@@ -73,6 +74,7 @@ impl Bench {
             force_noise_n: noise(scenario.force_noise_n)?,
             torque_noise_n_m: noise(scenario.torque_noise_n_m)?,
             force_offset: finite(scenario.force_offset_n)?,
+            is_disturbed: true,
             push_n: 0.0,
             state: scenario.start.clone(),
             period_s: rig.tick.period_s,
@@ -112,6 +114,12 @@ impl Bench {
         {
             pulses.take_over(before);
         }
+    }
+
+    /// Whether the disturbances of the scenario act from now on. While they do not, none of their random numbers are
+    /// drawn.
+    pub fn disturb(&mut self, is_disturbed: bool) {
+        self.is_disturbed = is_disturbed;
     }
 
     /// Spoils a drive with pulses in the next tick.
@@ -232,6 +240,11 @@ impl Bench {
     fn begin(&mut self, drive: Drive) -> (Drive, f64) {
         let now = if self.delay { std::mem::replace(&mut self.pending_drive, drive) } else { drive };
         let push = std::mem::take(&mut self.push_n);
+        if !self.is_disturbed {
+            self.torques.copy_from_slice(&self.pull_n_m);
+            self.pull_n_m.fill(0.0);
+            return (now, push);
+        }
         let disturbance = self.force_offset + push + self.force_noise_n * self.standard_normal();
         for joint in 0..self.torques.len() {
             let noise = self.torque_noise_n_m * self.standard_normal();
