@@ -52,6 +52,12 @@ fn every_stepper_is_homed_jogged_and_balanced_and_follows_its_set_point() {
             run.trace.samples().filter(|sample| sample.t > 6.0).map(|sample| sample.state[0]).collect();
         let cart_m = last.iter().sum::<f64>() / last.len() as f64;
         assert!((cart_m - 0.05).abs() < 0.02, "{name}: {cart_m}");
+        // Each tick's estimate stands beside the state of this tick, and not of one after it.
+        let samples: Vec<_> = run.trace.samples().collect();
+        let off_m = |late: usize| -> f64 {
+            samples.windows(2).map(|pair| (pair[1 - late].estimate[0] - pair[1].state[0]).abs()).sum()
+        };
+        assert!(off_m(0) < 0.5 * off_m(1), "{name}: {} and {}", off_m(0), off_m(1));
         let moves = |tick: &&upright_closed_loop::harness::FirmwareTick| tick.output.pulses() != 0;
         assert!(run.ticks.iter().filter(moves).count() > 100, "{name}");
     }

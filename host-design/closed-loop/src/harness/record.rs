@@ -132,10 +132,10 @@ impl<'a> RunRecord<'a> {
 
     /// Joins the telemetry of each tick with the true state of the bench in that tick.
     fn take(&mut self, session: &mut Session<'_>) -> Result<(), HarnessError> {
-        while !self.pending.is_empty()
-            && let Some(telemetry) = session.next_telemetry()
-        {
-            if self.next_tick.is_none() && !telemetry.state.controls() {
+        while let Some(telemetry) = session.next_telemetry() {
+            // Of a tick before the run.
+            let is_before = |first: &Pending| (telemetry.tick.wrapping_sub(first.number) as i32) < 0;
+            if self.next_tick.is_none() && self.pending.front().is_none_or(is_before) {
                 continue;
             }
             let expected = self.next_tick.unwrap_or(telemetry.tick);
