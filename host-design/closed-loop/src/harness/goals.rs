@@ -8,7 +8,7 @@ use super::hand::Hand;
 use super::operator::RETRY_S;
 use super::session::Session;
 use upright_design::rig::Rig;
-use upright_design::simulate::{Bench, Scenario};
+use upright_design::simulate::Scenario;
 
 /// Time before the links are raised again at which a hand takes hold of the rig (s): enough to come from either end of
 /// the rail.
@@ -24,8 +24,6 @@ pub struct Goals {
     /// Ticks between two requests, and those before a goal in which a hand puts the rig back.
     retry_ticks: usize,
     put_back_ticks: usize,
-    /// The hand that puts it back.
-    hand: Option<Hand>,
     /// The last tick in which the next goal was requested.
     asked: Option<usize>,
     begun: Vec<usize>,
@@ -36,13 +34,10 @@ impl Goals {
     pub fn of(rig: &Rig, scenario: &Scenario) -> Self {
         let ticks = |seconds: f64| seconds / rig.tick.period_s;
         let goals = scenario.goals.iter().map(|goal| (ticks(goal.at_s).round() as usize, goal.to));
-        let mut hand = Hand::hanging(rig);
-        hand.let_go();
         Self {
             goals: goals.collect(),
             retry_ticks: ticks(RETRY_S).max(1.0) as usize,
             put_back_ticks: ticks(PUT_BACK_S) as usize,
-            hand: Some(hand),
             ..Self::default()
         }
     }
@@ -57,12 +52,13 @@ impl Goals {
         &self.begun
     }
 
-    /// The request of this tick, if there is one; moves a rig that is put back.
+    /// The request of this tick, if there is one; `hand` puts the rig back, which is in state `x`.
     pub(super) fn request(
         &mut self,
         tick: usize,
         session: &Session<'_>,
-        bench: &mut Bench,
+        hand: &mut Hand,
+        x: &[f64],
     ) -> Option<Request> {
         let state = session.status().state;
         if matches!(state, State::Raising | State::Lowering)
@@ -71,12 +67,13 @@ impl Goals {
             self.begun.push(asked + session.pace().command_ticks);
         }
         let &(at, to) = self.goals.get(self.begun.len())?;
-        if let Some(hand) = &mut self.hand {
-            let ahead = at.saturating_sub(tick);
-            let puts_back = state == State::Calibrated
-                && to != Equilibrium::HANGING
-                && (1..=self.put_back_ticks).contains(&ahead);
-            put_back(hand, bench, puts_back);
+        let is_near = (1..=self.put_back_ticks).contains(&at.saturating_sub(tick));
+        let puts_back = is_near && state == State::Calibrated && to != Equilibrium::HANGING;
+        if puts_back {
+            hand.take_hold(x);
+        }
+        if !puts_back || hand.push_to(0.0) {
+            hand.let_go();
         }
         let rests = match state {
             State::Balancing | State::Holding => true,
@@ -88,16 +85,5 @@ impl Goals {
             self.asked = Some(tick);
             Request::Goto(to)
         })
-    }
-}
-
-/// The hand moves the hanging rig by one tick's step towards rest with the cart at 0, and lets go of it there.
-fn put_back(hand: &mut Hand, bench: &mut Bench, puts_back: bool) {
-    if !puts_back {
-        return hand.let_go();
-    }
-    hand.take_hold(bench.state());
-    if !hand.push_to(0.0) {
-        bench.hold(hand.held());
     }
 }

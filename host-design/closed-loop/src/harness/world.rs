@@ -170,7 +170,7 @@ impl<'t> World<'t> {
     /// # Errors
     /// [`HarnessError`] if the firmware does not answer, or a part has an error.
     pub fn tick(&mut self, parts: &mut [&mut dyn Participant]) -> Flow {
-        let goal = self.goals.request(self.ticks, &self.session, &mut self.bench);
+        let goal = self.goals.request(self.ticks, &self.session, &mut self.hand, self.bench.state());
         if let Some(request) = goal.or_else(|| parts.iter_mut().find_map(|part| part.say(self))) {
             self.session.send(request);
         }
