@@ -3,12 +3,10 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use upright::board::Output;
-use upright::protocol::KEEP_ALIVE;
-use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::{Equilibrium, Law};
 use upright_closed_loop::harness::{
-    Flow, Goals, HarnessError, Participant, Pins, World, until, with_firmware,
+    Flow, Goals, HarnessError, Host, Participant, Pins, World, until, with_firmware,
 };
 use upright_design::rig::Rig;
 use upright_design::simulate::{Goal, Scenario, Sensing, SimulationError};
@@ -75,7 +73,8 @@ impl Fingerprint {
             world.goals = Goals::of(rig, &scenario);
             let (ticks, hash, spent) = (ticks as usize, Sha256::new(), [0; 3]);
             let mut run = FingerprintRun { table, rounding, period_s, ticks, hash, spent, broken: None };
-            world.run(ticks, &mut [&mut run])?;
+            let mut host = Host::new(&scenario, period_s, world.session.pace().command_ticks);
+            world.run(ticks, &mut [&mut host, &mut run])?;
             Ok(Self {
                 table: String::new(),
                 run: Some(hex(&run.hash.finalize())),
@@ -92,8 +91,7 @@ impl Fingerprint {
     }
 }
 
-/// A run of `ticks` ticks: a host that only keeps the line alive, a pull on the rig, an encoder that breaks, and what
-/// is computed.
+/// In a run of `ticks` ticks: a pull on the rig, an encoder that breaks, and what is computed.
 struct FingerprintRun<'a> {
     table: &'a TableValues,
     rounding: PullRounding,
@@ -106,17 +104,13 @@ struct FingerprintRun<'a> {
 }
 
 impl Participant for FingerprintRun<'_> {
-    fn say(&mut self, world: &World<'_>) -> Option<Request> {
-        let every = (KEEP_ALIVE.as_secs_f64() / self.period_s).max(1.0) as usize;
-        world.ticks().is_multiple_of(every).then_some(Request::KeepAlive)
-    }
-
-    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, _: &mut Output) -> Flow {
         let pull = pull(world.ticks() as f64 * self.period_s, self.table, self.rounding);
         match self.table.drive.pulses() {
             Some(_) => world.bench.pull(0.0, &[pull]),
             None => world.bench.pull(pull, &[]),
         }
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -13,9 +13,7 @@ use super::SwingUpError;
 use super::closed_loop::deviation;
 use super::demonstration::{hang, up_and_down};
 use super::robustness::{MotionSpread, RandomRuns, TELEMETRY_TICKS, drawn};
-use upright_closed_loop::harness::{
-    Flow, Goals, HarnessError, Participant, Target, World, until, with_firmware,
-};
+use upright_closed_loop::harness::{BeforeIt, Goals, HarnessError, Target, World, until, with_firmware};
 use upright_design::motion::{RaiseAndLower, Transition};
 use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
 use upright_design::simulate::Scenario;
@@ -210,43 +208,30 @@ fn raised_and_lowered(
     world.goals = goals;
     world.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = (scenario.duration_s / rig.tick.period_s).round() as usize;
-    let mut watched = UpAndDown { motions, lower_at, last, reached: Reached::default() };
-    world.run(usize::MAX, &mut [&mut watched])?;
-    let mut reached = watched.reached;
-    reached.hung &= hang(world.bench.state());
-    Ok(reached)
-}
-
-/// Watches a rig that is raised and lowered, until it should hang.
-struct UpAndDown<'a> {
-    motions: &'a RaiseAndLower,
-    /// Tick from which it is told to lower the links.
-    lower_at: usize,
-    /// The last tick, if it begins to lower them at once.
-    last: usize,
-    reached: Reached,
-}
-
-impl Participant for UpAndDown<'_> {
-    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
-        let (tick, state, reached) = (world.ticks(), world.session.status().state, &mut self.reached);
-        if tick == self.lower_at {
+    let mut reached = Reached::default();
+    let mut watch = BeforeIt(|world: &mut World<'_>, _: &mut Output| {
+        let (tick, lowered) = (world.ticks(), world.goals.begun().first().copied());
+        if tick > last + lowered.map_or(0, |from| from - lower_at) {
+            return until(true);
+        }
+        let state = world.session.status().state;
+        if tick == lower_at {
             reached.arrived = state == State::Balancing;
         }
-        let lowered = world.goals.begun().first().copied();
-        let moves = [(&self.motions.raise, Some(0)), (&self.motions.lower, lowered)];
+        let moves = [(&motions.raise, Some(0)), (&motions.lower, lowered)];
         for ((motion, begin), largest) in moves.into_iter().zip(&mut reached.deviation_rad) {
             let planned = begin.and_then(|begin| motion.x.get(tick.checked_sub(begin)?));
             if let Some(planned) = planned {
                 largest.0 = largest.0.max(deviation(world.bench.state(), planned));
             }
         }
-        reached.fault = world.session.fault().map(|fault| fault.to_string());
-        reached.hung = reached.arrived && reached.fault.is_none() && state == State::Calibrated;
-    }
-
-    fn saw(&mut self, world: &mut World<'_>) -> Flow {
-        let late = world.goals.begun().first().map_or(0, |from| from - self.lower_at);
-        until(world.ticks() > self.last + late)
-    }
+        until(false)
+    });
+    world.run(usize::MAX, &mut [&mut watch])?;
+    reached.fault = world.session.fault().map(|fault| fault.to_string());
+    reached.hung = reached.arrived
+        && reached.fault.is_none()
+        && world.session.status().state == State::Calibrated
+        && hang(world.bench.state());
+    Ok(reached)
 }

@@ -9,9 +9,7 @@ use upright::table::Equilibrium;
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
 use super::robustness::TELEMETRY_TICKS;
-use upright_closed_loop::harness::{
-    Flow, Goals, HarnessError, Participant, Target, World, until, with_firmware,
-};
+use upright_closed_loop::harness::{BeforeIt, Goals, HarnessError, Target, World, until, with_firmware};
 use upright_design::motion::Transition;
 use upright_design::parallel;
 use upright_design::plant::absolute_angles;
@@ -163,59 +161,32 @@ fn arrival(
             Transition::Down
         }
     };
-    let in_motion = motion_ticks(table, transition);
-    let [latest, after, pushing] = [LONGEST_WAIT_S, AFTER_S, PUSH_S].map(in_ticks);
-    let is_over = false;
-    let mut pushed =
-        Pushed { rig, push, transition, in_motion, latest, after, pushing, arrived: None, is_over };
-    world.run(usize::MAX, &mut [&mut pushed])?;
-    Ok(pushed.arrived)
-}
-
-/// Pushes a rig in its motion, and watches whether it arrives.
-struct Pushed<'a> {
-    rig: &'a Rig,
-    push: Option<Push>,
-    transition: Transition,
-    /// Ticks of the motion.
-    in_motion: usize,
-    /// Ticks from the request within which the motion begins, after the motion, and of the push.
-    latest: usize,
-    after: usize,
-    pushing: usize,
-    /// The tick in which the motion began, if it has arrived.
-    arrived: Option<usize>,
-    is_over: bool,
-}
-
-impl Participant for Pushed<'_> {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
-        let (tick, is_up) = (world.ticks(), self.transition == Transition::Up);
+    let (is_up, in_motion) = (transition == Transition::Up, motion_ticks(table, transition));
+    let mut arrived = None;
+    let mut pushing = BeforeIt(|world: &mut World<'_>, output: &mut Output| {
+        let tick = world.ticks();
         let begin = if is_up { Some(0) } else { world.goals.begun().first().copied() };
-        let latest = world.goals.tick_of(0).map(|at| at + self.latest);
-        let end = begin.map(|begin| begin + self.in_motion).or(latest);
-        let Some(end) = end.filter(|end| output.enable || !(is_up || tick < *end)) else {
-            self.is_over = true;
-            return;
-        };
-        if tick == end + self.after {
-            let state = world.session.status().state;
-            let is_well = match self.transition {
-                Transition::Up => state == State::Balancing,
-                _ => state == State::Calibrated && hang(world.bench.state()),
-            };
-            self.arrived = begin.filter(|_| is_well && world.session.fault().is_none());
-            self.is_over = true;
+        let latest = world.goals.tick_of(0).map(|at| at + in_ticks(LONGEST_WAIT_S));
+        let Some(end) = begin.map(|begin| begin + in_motion).or(latest) else { return until(true) };
+        if !output.enable && (is_up || tick < end) {
+            return until(true);
         }
-        if let Some(push) = self.push.filter(|push| (push.tick..push.tick + self.pushing).contains(&tick)) {
-            let (force_n, torques_n_m) = push.on(self.rig, world.bench.state());
+        if tick == end + in_ticks(AFTER_S) {
+            let state = world.session.status().state;
+            let hangs = state == State::Calibrated && hang(world.bench.state());
+            let is_well = if is_up { state == State::Balancing } else { hangs };
+            arrived = begin.filter(|_| is_well && world.session.fault().is_none());
+            return until(true);
+        }
+        let is_now = |push: &Push| (push.tick..push.tick + in_ticks(PUSH_S)).contains(&tick);
+        if let Some(push) = push.filter(is_now) {
+            let (force_n, torques_n_m) = push.on(rig, world.bench.state());
             world.bench.pull(force_n, &torques_n_m);
         }
-    }
-
-    fn saw(&mut self, _: &mut World<'_>) -> Flow {
-        until(self.is_over)
-    }
+        until(false)
+    });
+    world.run(usize::MAX, &mut [&mut pushing])?;
+    Ok(arrived)
 }
 
 impl Push {

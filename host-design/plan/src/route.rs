@@ -8,9 +8,7 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{MotionSpread, TELEMETRY_TICKS, drawn};
-use upright_closed_loop::harness::{
-    Flow, Goals, HarnessError, Participant, Target, World, until, with_firmware,
-};
+use upright_closed_loop::harness::{BeforeIt, Goals, HarnessError, Target, World, until, with_firmware};
 use upright_design::motion::{Transition, rest};
 use upright_design::plant::{absolute_angles, without_turns};
 use upright_design::rig::Rig;
@@ -244,44 +242,28 @@ fn along_route(
     world.goals = Goals::of(rig, scenario);
     world.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = (route.duration_s / rig.tick.period_s) as usize;
-    let mut watched = OnRoute { route, last, run: RouteRun::default(), is_lost: false };
-    world.run(last + 1, &mut [&mut watched])?;
-    Ok(watched.run)
-}
-
-/// Watches a rig on its route, until a motion does not arrive.
-struct OnRoute<'a> {
-    route: &'a Route,
-    last: usize,
-    run: RouteRun,
-    is_lost: bool,
-}
-
-impl OnRoute<'_> {
-    /// Whether motion `index` of the route has begun and ended where it should.
-    fn has_arrived(&self, world: &World<'_>, index: usize) -> bool {
-        let transition = self.route.transitions[index];
-        let [_, after] = states(transition, self.route.links);
-        world.goals.begun().len() >= index
-            && world.session.status().state == after
-            && is_near(world.bench.state(), transition.to(self.route.links))
-    }
-}
-
-impl Participant for OnRoute<'_> {
-    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
-        let arrived = self.run.arrived;
-        let ends = world.goals.tick_of(arrived).unwrap_or(self.last);
-        if world.ticks() + 1 >= ends && arrived < self.route.transitions.len() {
-            self.is_lost = !self.has_arrived(world, arrived);
-            self.run.arrived += usize::from(!self.is_lost);
+    let mut run = RouteRun::default();
+    let mut watch = BeforeIt(|world: &mut World<'_>, _: &mut Output| {
+        run.fault = world.session.fault().map(|fault| fault.to_string());
+        let ends = world.goals.tick_of(run.arrived).unwrap_or(last);
+        if world.ticks() + 1 < ends || run.arrived >= route.transitions.len() {
+            return until(false);
         }
-        self.run.fault = world.session.fault().map(|fault| fault.to_string());
-    }
+        let arrives = has_arrived(world, route, run.arrived);
+        run.arrived += usize::from(arrives);
+        until(!arrives)
+    });
+    world.run(last + 1, &mut [&mut watch])?;
+    Ok(run)
+}
 
-    fn saw(&mut self, _: &mut World<'_>) -> Flow {
-        until(self.is_lost)
-    }
+/// Whether motion `index` of the route has begun and ended where it should.
+fn has_arrived(world: &World<'_>, route: &Route, index: usize) -> bool {
+    let transition = route.transitions[index];
+    let [_, after] = states(transition, route.links);
+    world.goals.begun().len() >= index
+        && world.session.status().state == after
+        && is_near(world.bench.state(), transition.to(route.links))
 }
 
 /// Whether all links are near `at`, apart from whole turns.

@@ -1,6 +1,6 @@
 //! A defect that a person starts while the rig runs.
 
-use crate::harness::{HarnessError, Participant, Pins, World};
+use crate::harness::{Flow, HarnessError, Participant, Pins, World, until};
 use upright::board::Output;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
@@ -119,8 +119,8 @@ impl<'a> Defective<'a> {
 }
 
 impl Participant for Defective<'_> {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
-        let Some(since) = self.since(world.ticks()) else { return };
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
+        let Some(since) = self.since(world.ticks()) else { return until(false) };
         if since == 0 {
             self.injection.serial(&mut world.session);
             self.is_visible |= self.kind == Defect::TableBit;
@@ -134,6 +134,7 @@ impl Participant for Defective<'_> {
             // No defect drives a motor that is off: it turns freely.
             output.drive = drive;
         }
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -180,7 +180,7 @@ impl<'a> RunRecord<'a> {
 }
 
 impl Participant for RunRecord<'_> {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         let t = world.ticks() as f64 * self.rig.tick.period_s;
         let state = world.bench.state().to_vec();
         // In a run that begins hanging, a link below the horizontal has fallen only while the firmware balances.
@@ -189,6 +189,7 @@ impl Participant for RunRecord<'_> {
         }
         let (number, target) = (world.session.tick_number(), self.scenario.target_m(t));
         self.pending.push_back(Pending { number, t, target, state, force: 0.0, output: *output });
+        until(false)
     }
 
     fn saw(&mut self, world: &mut World<'_>) -> Flow {

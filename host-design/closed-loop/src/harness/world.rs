@@ -33,13 +33,19 @@ pub fn until(is_over: bool) -> Flow {
 /// Who takes part in a run, tick by tick: a host, a defect, what is observed. The methods are called in the order in
 /// which they stand here.
 pub trait Participant {
-    /// A request for the firmware. Of all parts, the first that has one sends it: one command in a tick.
+    /// A request for the firmware. Of all participants, the first that has one sends it: one command in a tick.
     fn say(&mut self, _world: &World<'_>) -> Option<Request> {
         None
     }
 
-    /// Acts on the rig before it moves: pulls at it, moves the hand, or changes the output that reaches the motor.
-    fn act(&mut self, _world: &mut World<'_>, _output: &mut Output) {}
+    /// Acts on the rig before it moves: pulls at it, moves the hand, or changes the output that reaches the motor. May
+    /// end the run before the rig moves.
+    ///
+    /// # Errors
+    /// [`HarnessError`] if the run cannot go on.
+    fn act(&mut self, _world: &mut World<'_>, _output: &mut Output) -> Flow {
+        until(false)
+    }
 
     /// Changes what the firmware reads after the rig has moved.
     ///
@@ -63,16 +69,25 @@ impl<P: Participant> Participant for Option<P> {
         self.as_mut()?.say(world)
     }
 
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
-        self.iter_mut().for_each(|part| part.act(world, output));
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
+        self.as_mut().map_or_else(|| until(false), |one| one.act(world, output))
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {
-        self.iter_mut().try_for_each(|part| part.pins(world, pins))
+        self.iter_mut().try_for_each(|one| one.pins(world, pins))
     }
 
     fn saw(&mut self, world: &mut World<'_>) -> Flow {
-        self.as_mut().map_or_else(|| until(false), |part| part.saw(world))
+        self.as_mut().map_or_else(|| until(false), |one| one.saw(world))
+    }
+}
+
+/// A participant that is only asked before the rig moves: see [`Participant::act`].
+pub struct BeforeIt<F>(pub F);
+
+impl<F: FnMut(&mut World<'_>, &mut Output) -> Flow> Participant for BeforeIt<F> {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
+        self.0(world, output)
     }
 }
 
@@ -168,14 +183,18 @@ impl<'t> World<'t> {
     /// pins. Returns whether the run goes on.
     ///
     /// # Errors
-    /// [`HarnessError`] if the firmware does not answer, or a part has an error.
-    pub fn tick(&mut self, parts: &mut [&mut dyn Participant]) -> Flow {
+    /// [`HarnessError`] if the firmware does not answer, or a participant has an error.
+    pub fn tick(&mut self, participants: &mut [&mut dyn Participant]) -> Flow {
         let goal = self.goals.request(self.ticks, &self.session, &mut self.hand, self.bench.state());
-        if let Some(request) = goal.or_else(|| parts.iter_mut().find_map(|part| part.say(self))) {
+        if let Some(request) = goal.or_else(|| participants.iter_mut().find_map(|one| one.say(self))) {
             self.session.send(request);
         }
         let mut acting = self.output;
-        parts.iter_mut().for_each(|part| part.act(self, &mut acting));
+        for one in participants.iter_mut() {
+            if one.act(self, &mut acting)?.is_break() {
+                return until(true);
+            }
+        }
         self.force_n = if self.hand.has_hold() {
             self.bench.hold(self.hand.held());
             0.0
@@ -183,24 +202,28 @@ impl<'t> World<'t> {
             self.bench.tick(acting.drive)
         };
         let mut pins = self.inputs();
-        parts.iter_mut().try_for_each(|part| part.pins(self, &mut pins))?;
+        participants.iter_mut().try_for_each(|one| one.pins(self, &mut pins))?;
         self.output = self.session.tick(&pins)?;
         self.ticks += 1;
         let mut is_over = false;
-        for part in parts {
-            is_over |= part.saw(self)?.is_break();
+        for one in participants {
+            is_over |= one.saw(self)?.is_break();
         }
         until(is_over)
     }
 
-    /// Runs `ticks` ticks, or until a part ends the run. What the firmware has sent in a tick and no part has taken is
+    /// Runs `ticks` ticks, or until a participant ends the run. What the firmware has sent in a tick and no participant has taken is
     /// forgotten.
     ///
     /// # Errors
     /// As for [`tick`](Self::tick).
-    pub fn run(&mut self, ticks: usize, parts: &mut [&mut dyn Participant]) -> Result<(), HarnessError> {
+    pub fn run(
+        &mut self,
+        ticks: usize,
+        participants: &mut [&mut dyn Participant],
+    ) -> Result<(), HarnessError> {
         for _ in 0..ticks {
-            let flow = self.tick(parts)?;
+            let flow = self.tick(participants)?;
             self.session.forget_received();
             if flow.is_break() {
                 break;

@@ -8,7 +8,9 @@ use upright::board::Output;
 use upright::supervision::sign_check::Signs;
 use upright::supervision::supervisor::State;
 use upright_closed_loop::defects::{Defect, Defective, Trial, push_limit_n};
-use upright_closed_loop::harness::{HarnessError, Participant, Pins, RailEnds, Status, Target, Wish, World};
+use upright_closed_loop::harness::{
+    Flow, HarnessError, Participant, Pins, RailEnds, Status, Target, Wish, World, until,
+};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::simulate::{Bench, Disturbance, Scenario, StepDefect};
 use upright_design::table::TableValues;
@@ -200,9 +202,9 @@ impl<'a, 't> PoweredMachine<'a, 't> {
         self.surroundings.delay_ticks = self.properties.get(DELAY) as usize;
         self.surroundings.defect_n = self.defect.as_ref().map_or(0.0, |defect| defect.push_n(tick));
         // What is wrong with a sensor is behind its resolution, and what is wrong with the motor before its delay.
-        let parts: &mut [&mut dyn Participant] =
+        let participants: &mut [&mut dyn Participant] =
             &mut [&mut self.coarse, &mut self.rail, &mut self.defect, &mut self.surroundings];
-        let _ = self.world.tick(parts)?;
+        let _ = self.world.tick(participants)?;
         let telemetry = console.monitor.receive(self.world.session.last_bytes(), now);
         console.take(telemetry);
         self.world.session.forget_received();
@@ -329,7 +331,7 @@ impl Surroundings {
 }
 
 impl Participant for Surroundings {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         self.delayed.push_back(*output);
         while self.delayed.len() > self.delay_ticks + 1 {
             self.delayed.pop_front();
@@ -340,7 +342,7 @@ impl Participant for Surroundings {
         world.hand.does(wish, world.bench.state(), output);
         self.pull = None;
         if world.hand.has_hold() {
-            return;
+            return until(false);
         }
         let state = world.bench.state();
         self.pull =
@@ -360,5 +362,6 @@ impl Participant for Surroundings {
         if stop_n * f64::from(output.pulses()) < 0.0 {
             world.bench.spoil(StepDefect::Jammed);
         }
+        until(false)
     }
 }

@@ -154,8 +154,9 @@ where
     R: FnMut(usize, &mut Pins),
     T: FnMut(usize, &mut World<'_>, &mut Output) -> bool,
 {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         self.is_over = self.held > 0 && (self.then)(self.held, world, output);
+        until(false)
     }
 
     fn pins(&mut self, _: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -147,11 +147,8 @@ impl DefectRun<'_> {
             observed: Observed::default(),
             fault: None,
         };
-        let ran = world.run(usize::MAX, &mut [&mut balanced]);
+        world.run(usize::MAX, &mut [&mut balanced])?;
         let mut observed = balanced.observed;
-        if !observed.runs_on(ran)? {
-            return Ok(observed);
-        }
         observed.fault = balanced.fault;
         self.find_reason(world, &mut observed);
         if trial.kind != Defect::HostDeaf && observed.off.is_none() {
@@ -380,7 +377,7 @@ impl Participant for BalancedRun<'_> {
         (is_due && self.defect.host_is_alive(tick)).then_some(Request::KeepAlive)
     }
 
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         let (run, tick) = (self.run, world.ticks());
         let is_on = run.is_on(&world.session, output);
         self.observed.output(tick, *output, is_on, run.ticks_since_stop(&world.session));
@@ -388,7 +385,7 @@ impl Participant for BalancedRun<'_> {
         if self.observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
             self.observed.fault = self.fault;
         }
-        self.defect.act(world, output);
+        let _ = self.defect.act(world, output)?;
         if self.defect.is_visible() {
             self.observed.visible.get_or_insert(tick);
         }
@@ -396,6 +393,7 @@ impl Participant for BalancedRun<'_> {
         self.observed.outside |=
             self.observed.off.is_none() && run.is_outside(tick, lowered_from, world.bench.state());
         run.push(world, &self.defect);
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -22,11 +22,9 @@ impl DefectRun<'_> {
         let defect = self.defective(is_there_before.then_some(1));
         let observed = Observed::default();
         let mut jogged = Jogged { run: self, is_there_before, defect, observed, on: None };
-        let ran = world.run(usize::MAX, &mut [&mut jogged]);
+        world.run(usize::MAX, &mut [&mut jogged])?;
         let mut observed = jogged.observed;
-        if observed.runs_on(ran)? {
-            self.after_jog(world, &mut observed)?;
-        }
+        self.after_jog(world, &mut observed)?;
         Ok(observed)
     }
 
@@ -99,10 +97,10 @@ impl Participant for Jogged<'_> {
         presses.then_some(Request::Jog { along: self.run.trial.sign > 0.0 })
     }
 
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         let (run, now) = (self.run, world.ticks());
         if now == 0 {
-            return;
+            return until(false);
         }
         // The motor pushes the cart: a drive with pulses, which also holds it, if telemetry says so.
         let is_pulsed = run.table.drive.pulses().is_some();
@@ -116,8 +114,9 @@ impl Participant for Jogged<'_> {
         if let Some(on) = self.on {
             self.observed.output(now - on, *output, is_on, usize::from(is_pulsed && output.enable));
         }
-        self.defect.act(world, output);
+        let _ = self.defect.act(world, output)?;
         self.move_rig(world, output);
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -4,7 +4,6 @@ use upright::board::Output;
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::jog::MotorSign;
-use upright_closed_loop::harness::HarnessError;
 
 /// What was observed in a trial. Ticks count from the release of the rig.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -43,15 +42,6 @@ impl Observed {
             let since = tick.saturating_sub(before);
             self.off = Some(self.off.map_or(since, |off| off.min(since)));
         }
-    }
-
-    /// Whether the firmware runs on after a run: one that has stopped after the motor went off is dead.
-    ///
-    /// # Errors
-    /// That of the run otherwise.
-    pub(super) fn runs_on(&mut self, ran: Result<(), HarnessError>) -> Result<bool, HarnessError> {
-        self.dead = matches!(ran, Err(HarnessError::Stopped { .. })) && self.off.is_some();
-        if self.dead { Ok(false) } else { ran.map(|()| true) }
     }
 
     /// Whether the defect is visible, but the motor is not yet off and no link too far: a slow rig takes time to fall.

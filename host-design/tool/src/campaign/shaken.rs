@@ -63,11 +63,9 @@ impl DefectRun<'_> {
         let host = ShakingHost::begin(feed.clone(), self.rig, self.table, &mut world)?;
         let defect = self.defective(Some(self.trial.onset));
         let mut shaken = WhileShaken { run: self, host: Some(host), defect, observed: Observed::default() };
-        let ran = world.run(usize::MAX, &mut [&mut shaken]);
+        world.run(usize::MAX, &mut [&mut shaken])?;
         let mut observed = shaken.observed;
-        if observed.runs_on(ran)? {
-            self.find_reason(&mut world, &mut observed);
-        }
+        self.find_reason(&mut world, &mut observed);
         Ok(observed)
     }
 
@@ -88,7 +86,7 @@ struct WhileShaken<'r> {
 }
 
 impl Participant for WhileShaken<'_> {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         // A drive with pulses also holds the cart and brings it to rest, which does not count.
         let state = world.session.status().state;
         let is_shaken = self.run.table.drive.pulses().is_none() || state == State::Identifying;
@@ -98,7 +96,8 @@ impl Participant for WhileShaken<'_> {
             self.observed.fault = world.session.fault();
         }
         world.bench.push(self.defect.push_n(world.ticks()));
-        self.defect.act(world, output);
+        let _ = self.defect.act(world, output)?;
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

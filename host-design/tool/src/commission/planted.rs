@@ -4,7 +4,7 @@ use core::fmt;
 use core::str::FromStr;
 
 use upright::board::Output;
-use upright_closed_loop::harness::{HarnessError, Participant, Pins, World};
+use upright_closed_loop::harness::{Flow, HarnessError, Participant, Pins, World};
 use upright_design::rig::{Link, PerJoint, Rig};
 use upright_design::simulate::{Bench, Scenario, StepDefect};
 use upright_design::table::TableValues;
@@ -178,11 +178,11 @@ impl<'a> DefectWires<'a> {
 }
 
 impl Participant for DefectWires<'_> {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         if self.planted.what == What::CartFriction {
             world.bench.spoil(StepDefect::Jammed);
         }
-        self.defective.act(world, output);
+        self.defective.act(world, output)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

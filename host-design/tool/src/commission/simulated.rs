@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use upright::board::Output;
 use upright::table::Law;
-use upright_closed_loop::harness::{Hand, HarnessError, Participant, Pins, RailEnds, Target, Wish, World};
+use upright_closed_loop::harness::{
+    Flow, Hand, HarnessError, Participant, Pins, RailEnds, Target, Wish, World, until,
+};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError};
 use upright_design::table::TableValues;
@@ -83,7 +85,7 @@ struct PromptedPerson {
 }
 
 impl Participant for PromptedPerson {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         // A drive with pulses also holds the cart before the control law commands it.
         let is_on = output.enable && (!self.takes_pulses || world.session.status().state.controls());
         let wish = match self.task {
@@ -96,6 +98,7 @@ impl Participant for PromptedPerson {
             _ => Wish::Rest,
         };
         world.hand.does(wish, world.bench.state(), output);
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -5,7 +5,7 @@ use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
 use upright::board::Output;
-use upright_closed_loop::harness::{Flow, Participant, Target, World, until};
+use upright_closed_loop::harness::{BeforeIt, Target, World, until};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -45,15 +45,31 @@ impl Relay<'_> {
         // No set-point is commanded, so the firmware needs no keep-alives.
         world.raise(None)?;
         self.listener.set_nonblocking(true)?;
-        let mut line = SocketLine {
-            relay: &self,
-            client: Some(self.first_client()?),
-            begin: Instant::now(),
-            failed: None,
-        };
-        let ticks = (self.scenario.duration_s / self.rig.tick.period_s).ceil() as usize;
-        world.run(ticks, &mut [&mut line])?;
-        line.failed.map_or(Ok(()), |error| Err(error.into()))
+        let (period_s, mut client, mut failed) = (self.rig.tick.period_s, Some(self.first_client()?), None);
+        let begin = Instant::now();
+        let mut line = BeforeIt(|world: &mut World<'_>, output: &mut Output| {
+            client.take_if(|stream| !send(stream, world.session.last_bytes()));
+            let due = begin + Duration::from_secs_f64(world.ticks() as f64 * period_s);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            if output.enable {
+                world.hand.let_go();
+            } else {
+                world.hand.hold_in(&self.scenario.start);
+            }
+            if client.is_none() {
+                client = accepted(self.listener).unwrap_or_else(|error| {
+                    failed = Some(error);
+                    None
+                });
+            }
+            match client.as_mut().map_or(Some(Vec::new()), receive) {
+                Some(bytes) => world.session.send_bytes(&bytes),
+                None => client = None,
+            }
+            until(failed.is_some())
+        });
+        world.run((self.scenario.duration_s / period_s).ceil() as usize, &mut [&mut line])?;
+        failed.map_or(Ok(()), |error| Err(error.into()))
     }
 
     /// Waits for the first client, as long as the run would last.
@@ -68,43 +84,6 @@ impl Relay<'_> {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-    }
-}
-
-/// The line between the client and the firmware.
-struct SocketLine<'a> {
-    relay: &'a Relay<'a>,
-    client: Option<TcpStream>,
-    begin: Instant,
-    /// Why no client can connect any more.
-    failed: Option<std::io::Error>,
-}
-
-impl Participant for SocketLine<'_> {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
-        if output.enable {
-            world.hand.let_go();
-        } else {
-            world.hand.hold_in(&self.relay.scenario.start);
-        }
-        if self.client.is_none() {
-            match accepted(self.relay.listener) {
-                Ok(client) => self.client = client,
-                Err(error) => self.failed = Some(error),
-            }
-        }
-        match self.client.as_mut().map_or(Some(Vec::new()), receive) {
-            Some(bytes) => world.session.send_bytes(&bytes),
-            None => self.client = None,
-        }
-    }
-
-    fn saw(&mut self, world: &mut World<'_>) -> Flow {
-        self.client.take_if(|stream| !send(stream, world.session.last_bytes()));
-        let passed_s = world.ticks() as f64 * self.relay.rig.tick.period_s;
-        let due = self.begin + Duration::from_secs_f64(passed_s);
-        std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        until(self.failed.is_some())
     }
 }
 

@@ -134,10 +134,10 @@ struct Disturbed {
 }
 
 impl Participant for Disturbed {
-    fn act(&mut self, world: &mut World<'_>, output: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         let Some(since) = world.ticks().checked_sub(ONSET) else {
             assert!(output.enable || self.host.log().ticks().len() < 20);
-            return;
+            return until(false);
         };
         if since == 0 {
             assert_eq!(world.session.status().state, State::Identifying);
@@ -148,6 +148,7 @@ impl Participant for Disturbed {
         } else if self.off.is_none() {
             (self.off, self.cart_m) = (Some(since + 1), world.bench.state()[0]);
         }
+        until(false)
     }
 
     fn pins(&mut self, world: &mut World<'_>, pins: &mut Pins) -> Result<(), HarnessError> {

@@ -181,11 +181,12 @@ impl<'a> UntilFall<'a> {
 }
 
 impl Participant for UntilFall<'_> {
-    fn act(&mut self, world: &mut World<'_>, _: &mut Output) {
+    fn act(&mut self, world: &mut World<'_>, _: &mut Output) -> Flow {
         self.t = world.ticks() as f64 * self.rig.tick.period_s;
         self.state.copy_from_slice(world.bench.state());
         let off = world.session.fault().map(|fault| Fall { at_s: self.t, kind: FallKind::MotorOff(fault) });
         self.fall = off.or_else(|| Fall::of(self.rig, self.t, &without_turns(&self.state)));
+        until(false)
     }
 
     fn saw(&mut self, world: &mut World<'_>) -> Flow {
