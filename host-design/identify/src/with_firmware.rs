@@ -86,8 +86,8 @@ pub struct ShakingHost {
 }
 
 impl ShakingHost {
-    /// Asks the firmware of a machine that is [checked and hangs](checked_and_hanging) to shake it, and has the hand let
-    /// go in the first tick.
+    /// Asks the firmware of a machine that is [checked and hangs](checked_and_hanging) to shake it, and has the hand
+    /// let go in the first tick.
     ///
     /// # Errors
     /// [`HarnessError`] if the firmware refuses.

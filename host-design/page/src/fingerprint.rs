@@ -123,7 +123,7 @@ impl Participant for FingerprintRun<'_> {
     }
 
     fn saw(&mut self, world: &mut World<'_>) -> Flow {
-        self.hash.update(format!("{:?}", world.output()));
+        self.hash.update(format!("{:?}", world.last_output()));
         self.hash.update(world.session.last_bytes());
         world.bench.state().iter().for_each(|value| self.hash.update(value.to_bits().to_le_bytes()));
         match world.session.status().state {

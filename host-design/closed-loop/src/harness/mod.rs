@@ -5,8 +5,8 @@
 //! another target. Everything else is the same code for all targets, so that two runs of a scenario can be compared
 //! bit by bit: a [`Session`] sends commands and collects telemetry, a [`World`] adds the rig and the hand at it.
 //!
-//! Every run is the same loop, [`World::tick`], with a list of those who take part in it, each a [`Participant`]: a host, a
-//! defect, what is observed. [`record`] is one of them.
+//! Every run is the same loop, [`World::tick`], with a list of those who take part in it, each a [`Participant`]: a
+//! host, a defect, what is observed. [`record`] is one of them.
 //!
 //! No type here depends on the numbers of states and sensors, except the firmware itself.
 

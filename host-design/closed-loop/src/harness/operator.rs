@@ -83,7 +83,8 @@ impl Operator {
     }
 
     /// What the operator does in tick number `tick`, when `output` was the firmware's last output: moves the rig on
-    /// `bench` with `hand`, and returns the request. Nothing once the controller commands the motor and the hand has let go.
+    /// `bench` with `hand`, and returns the request. Nothing once the controller commands the motor and the hand has
+    /// let go.
     pub(super) fn act(
         &mut self,
         tick: usize,

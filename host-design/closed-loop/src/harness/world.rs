@@ -164,7 +164,7 @@ impl<'t> World<'t> {
     }
 
     /// The firmware's output in the last tick, with which the rig moves in the next one.
-    pub fn output(&self) -> Output {
+    pub fn last_output(&self) -> Output {
         self.output
     }
 
@@ -212,8 +212,8 @@ impl<'t> World<'t> {
         until(is_over)
     }
 
-    /// Runs `ticks` ticks, or until a participant ends the run. What the firmware has sent in a tick and no participant has taken is
-    /// forgotten.
+    /// Runs `ticks` ticks, or until a participant ends the run. What the firmware has sent in a tick and no participant
+    /// has taken is forgotten.
     ///
     /// # Errors
     /// As for [`tick`](Self::tick).

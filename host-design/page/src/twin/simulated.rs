@@ -311,7 +311,7 @@ impl Surroundings {
     fn pushes(&mut self, world: &World<'_>) -> f64 {
         // A drive that takes pulses is on while it only holds the cart, too.
         let controls = !self.takes_pulses || world.session.status().state.controls();
-        let survives = world.output().enable && controls;
+        let survives = world.last_output().enable && controls;
         let challenge = self.challenge.as_mut();
         self.defect_n + challenge.map_or(0.0, |challenge| challenge.tick(survives, self.period_s))
     }

@@ -67,8 +67,8 @@ impl DefectRun<'_> {
 /// A rig that is pushed by its motor as long as a key is held, with a defect.
 struct Jogged<'r> {
     run: &'r DefectRun<'r>,
-    /// Whether the defect is there before the motor comes on. The rig is free while it is on then, and otherwise held by
-    /// a hand, which does not hold a cart that goes where its pulses say.
+    /// Whether the defect is there before the motor comes on. The rig is free while it is on then, and otherwise held
+    /// by a hand, which does not hold a cart that goes where its pulses say.
     is_there_before: bool,
     defect: Defective<'r>,
     observed: Observed,

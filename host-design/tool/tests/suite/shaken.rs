@@ -235,7 +235,7 @@ struct OnTicks(u32);
 
 impl Participant for OnTicks {
     fn saw(&mut self, world: &mut World<'_>) -> Flow {
-        self.0 += u32::from(world.output().enable);
+        self.0 += u32::from(world.last_output().enable);
         until(false)
     }
 }
