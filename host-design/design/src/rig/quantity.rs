@@ -42,4 +42,12 @@ impl Rig {
             PlantDescription::Model(_) => Quantity::OF_MODEL,
         }
     }
+
+    /// What follows the set-point.
+    pub fn output_quantity(&self) -> Quantity {
+        match &self.plant {
+            PlantDescription::Chain(_) => Quantity { name: "position", unit: "m" },
+            PlantDescription::Model(_) => Quantity { name: "output", unit: "" },
+        }
+    }
 }

@@ -120,11 +120,6 @@ fn of_model(rig: &Rig) -> &'static str {
     if is_chain(rig) { "" } else { ", on the linear model" }
 }
 
-/// Unit of the set-point, with a space before it; empty for a model.
-fn unit(rig: &Rig) -> &'static str {
-    if is_chain(rig) { " m" } else { "" }
-}
-
 /// What the controller measures in the runs that are not as on the bench. A drive with pulses knows only those of the
 /// cart.
 fn measured(rig: &Rig) -> &'static str {
@@ -136,9 +131,8 @@ fn measured(rig: &Rig) -> &'static str {
 
 fn step_plan(rig: &Rig, scenario: Scenario) -> ScenePlan {
     let text = format!(
-        "Set-point moved by {}{} at 0 s{}; {}{}.",
-        number(scenario.step_m),
-        unit(rig),
+        "Set-point moved by {} at 0 s{}; {}{}.",
+        rig.output_quantity().of(&number(scenario.step_m)),
         if is_chain(rig) { ", made into a ramp by the governor" } else { "" },
         measured(rig),
         of_model(rig)
@@ -177,9 +171,9 @@ fn disturbed_plan(rig: &Rig, scenario: &Scenario) -> ScenePlan {
 }
 
 fn encoder_plan(rig: &Rig, scenario: &Scenario) -> ScenePlan {
-    let (step, unit, noise) = (number(scenario.step_m), unit(rig), noise_text(rig, scenario.seed));
+    let (step, noise) = (rig.output_quantity().of(&number(scenario.step_m)), noise_text(rig, scenario.seed));
     let text = format!(
-        "As on the bench: the controller measures encoder counts only and estimates the state. Set-point moved by {step}{unit}; \
+        "As on the bench: the controller measures encoder counts only and estimates the state. Set-point moved by {step}; \
          {noise}."
     );
     let scenario = Scenario { sensing: Sensing::Encoders, ..disturbed(rig, scenario) };

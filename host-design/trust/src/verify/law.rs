@@ -357,9 +357,9 @@ pub const QUANTITIES: &[TrustQuantity] = &[
         values: One(|rig, law| {
             let step = law.attraction.as_ref()?.raw_step.as_ref()?;
             let largest = if step.at_largest_tried { " (largest tried)" } else { "" };
-            let m = if is_chain(rig) { " m" } else { "" };
+            let size = rig.output_quantity().of(&number(step.size));
             let peak = force(rig, step.peak_force_n);
-            Some(format!("{}{m}{largest}, peak {} {peak}", number(step.size), rig.input_quantity().name))
+            Some(format!("{size}{largest}, peak {} {peak}", rig.input_quantity().name))
         }),
     },
     TrustQuantity {
