@@ -15,7 +15,7 @@ impl Imperfection {
         if let Some(bristle_rad) = bristle_rad {
             reality.friction.presliding_rad = PerJoint::all(bristle_rad);
         }
-        self.set(&mut reality, size);
+        (self.set)(&mut reality, size);
         if let (Some(real_s), Some(stated_s)) = (&mut reality.driver.driver_lag_s, rig.actuator.lag_s()) {
             *real_s += stated_s;
         }

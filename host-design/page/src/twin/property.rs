@@ -1,7 +1,7 @@
 //! What is true of the simulated machine but not known to the controller.
 
 use serde::Serialize;
-use upright_design::rig::{IMPERFECTIONS, Imperfection, Rig};
+use upright_design::rig::{IMPERFECTIONS, Imperfection, Reality, Rig};
 use upright_design::simulate::Disturbance;
 
 /// A property that can be changed while the rig runs.
@@ -18,14 +18,17 @@ pub(crate) struct Property {
     /// Value of the machine as designed for.
     nominal: f64,
     #[serde(skip)]
-    change: Changed,
+    changed: Changed,
+    /// Whether it changes how the machine of a rig moves.
+    #[serde(skip)]
+    acts: fn(&Rig) -> bool,
 }
 
 /// What a property changes.
 #[derive(Debug, Clone, Copy)]
 enum Changed {
-    /// An imperfection, by this many of its units.
-    Imperfection(&'static Imperfection, f64),
+    /// The machine as it truly is.
+    Reality(fn(&mut Reality, f64)),
     /// Something else of the rig as it truly is.
     Rig(fn(&mut Rig, f64)),
     /// The disturbances of the simulated machine.
@@ -41,85 +44,86 @@ pub(crate) const COARSENESS: &str = "coarseness";
 /// Name of the additional delay (ticks).
 pub(crate) const DELAY: &str = "delay";
 
-impl Property {
-    fn new(
-        name: &'static str,
-        label: &'static str,
-        unit: &'static str,
-        [low, high, step]: [f64; 3],
-        change: Changed,
-    ) -> Self {
-        Self { name, label, unit, low, high, step, nominal: 0.0, change }
-    }
+const fn property(
+    name: &'static str,
+    label: &'static str,
+    unit: &'static str,
+    [low, high, step]: [f64; 3],
+    changed: Changed,
+    acts: fn(&Rig) -> bool,
+) -> Property {
+    Property { name, label, unit, low, high, step, nominal: 0.0, changed, acts }
+}
 
-    /// The slider of an imperfection; none if it has none, or is not simulated on `rig`.
-    fn of_imperfection(imperfection: &'static Imperfection, rig: &Rig) -> Option<Self> {
-        let slider = imperfection.slider.filter(|_| imperfection.not_on(rig).is_none())?;
-        let change = Changed::Imperfection(imperfection, slider.scale);
-        Some(Self::new(slider.name, slider.label, slider.unit, slider.range, change))
-    }
+/// The properties that are no rows of [`IMPERFECTIONS`].
+const OTHERS: [Property; 9] = {
+    const PERCENT: [f64; 3] = [-50.0, 100.0, 1.0];
+    let mass = Changed::Reality(|reality, more| {
+        let each = &mut reality.parameters.link_mass_percent;
+        *each = each.plus(more);
+    });
+    let cart_mass = Changed::Reality(|reality, more| reality.parameters.cart_mass_percent += more);
+    let drag = Changed::Reality(|reality, more| {
+        let each = &mut reality.air_drag.air_drag_n_m_s2_per_rad2;
+        *each = each.plus(1e-3 * more);
+    });
+    let joint_viscous = Changed::Rig(|rig, more| {
+        let links = rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links);
+        links.for_each(|link| link.friction_n_m_s_per_rad += 1e-3 * more);
+    });
+    let cart_viscous = Changed::Rig(|rig, more| {
+        rig.chain_mut().into_iter().for_each(|chain| chain.cart.friction_n_s_per_m += more);
+    });
+    let jitter =
+        Changed::Rig(|rig, percent| rig.reality.driver.jitter_s += 0.01 * percent * rig.tick.period_s);
+    let (coarse, small) = ([1.0, 32.0, 1.0], [0.0, 1.0, 0.01]);
+    [
+        property("mass", "masses of the links", "% more", PERCENT, mass, always),
+        property("cart-mass", "mass of the cart", "% more", PERCENT, cart_mass, feels_forces),
+        property(
+            "joint-viscous",
+            "viscous friction in each joint",
+            "mN·m·s/rad more",
+            small,
+            joint_viscous,
+            always,
+        ),
+        property("air-drag", "air drag of each link", "mN·m·s²/rad² more", [0.0, 1.0, 0.001], drag, always),
+        property(
+            "cart-viscous",
+            "viscous friction of the cart",
+            "N·s/m more",
+            [0.0, 10.0, 0.1],
+            cart_viscous,
+            feels_forces,
+        ),
+        property(FORCE_NOISE, "force noise", "N rms", [0.0, 2.0, 0.01], Changed::Disturbance, feels_forces),
+        property("jitter", "jitter of the tick", "% of a tick", [0.0, 40.0, 1.0], jitter, imposes_force),
+        Property {
+            nominal: 1.0,
+            ..property(COARSENESS, "coarser encoders", "times", coarse, Changed::Signals, always)
+        },
+        property(DELAY, "more delay", "ticks", [0.0, 100.0, 1.0], Changed::Signals, imposes_force),
+    ]
+};
 
-    /// All properties of a machine as designed for, in the order of the page. The cart of a drive that takes pulses
-    /// goes where they say; forces on it matter only if `[reality]` has the motor.
-    fn all_of(rig: &Rig) -> Vec<Self> {
-        let takes_pulses = rig.actuator.held().is_motion();
-        let feels_forces = !takes_pulses || rig.reality.step_motor.holding_force_n.is_some();
-        let mass = Changed::Rig(|rig, more| {
-            let percent = &mut rig.reality.parameters.link_mass_percent;
-            *percent = percent.plus(more);
-        });
-        let cart_mass = Changed::Rig(|rig, more| rig.reality.parameters.cart_mass_percent += more);
-        let mut all = vec![Self::new("mass", "masses of the links", "% more", [-50.0, 100.0, 1.0], mass)];
-        if feels_forces {
-            all.push(Self::new("cart-mass", "mass of the cart", "% more", [-50.0, 100.0, 1.0], cart_mass));
-        }
-        all.extend(IMPERFECTIONS.iter().filter_map(|imperfection| Self::of_imperfection(imperfection, rig)));
-        let viscous = Changed::Rig(|rig, more| {
-            let links = rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links);
-            links.for_each(|link| link.friction_n_m_s_per_rad += 1e-3 * more);
-        });
-        let drag = Changed::Rig(|rig, more| {
-            let drag = &mut rig.reality.air_drag.air_drag_n_m_s2_per_rad2;
-            *drag = drag.plus(1e-3 * more);
-        });
-        all.extend([
-            Self::new(
-                "joint-viscous",
-                "viscous friction in each joint",
-                "mN·m·s/rad more",
-                [0.0, 1.0, 0.01],
-                viscous,
-            ),
-            Self::new("air-drag", "air drag of each link", "mN·m·s²/rad² more", [0.0, 1.0, 0.001], drag),
-        ]);
-        if feels_forces {
-            let viscous = Changed::Rig(|rig, more| {
-                rig.chain_mut().into_iter().for_each(|chain| chain.cart.friction_n_s_per_m += more);
-            });
-            let unit = "N·s/m more";
-            all.push(Self::new(
-                "cart-viscous",
-                "viscous friction of the cart",
-                unit,
-                [0.0, 10.0, 0.1],
-                viscous,
-            ));
-            let noise =
-                Self::new(FORCE_NOISE, "force noise", "N rms", [0.0, 2.0, 0.01], Changed::Disturbance);
-            all.push(Self { nominal: Disturbance::of(rig).force_n, ..noise });
-        }
-        let coarseness =
-            Self::new(COARSENESS, "coarser encoders", "times", [1.0, 32.0, 1.0], Changed::Signals);
-        all.push(Self { nominal: 1.0, ..coarseness });
-        if !takes_pulses {
-            let jitter = Changed::Rig(|rig, percent| {
-                rig.reality.driver.jitter_s += 0.01 * percent * rig.tick.period_s;
-            });
-            all.push(Self::new("jitter", "jitter of the tick", "% of a tick", [0.0, 40.0, 1.0], jitter));
-            all.push(Self::new(DELAY, "more delay", "ticks", [0.0, 100.0, 1.0], Changed::Signals));
-        }
-        all
-    }
+fn always(_: &Rig) -> bool {
+    true
+}
+
+fn imposes_force(rig: &Rig) -> bool {
+    !rig.actuator.held().is_motion()
+}
+
+/// The cart of a drive that takes pulses goes where they say; forces on it matter only if `[reality]` has the motor.
+fn feels_forces(rig: &Rig) -> bool {
+    imposes_force(rig) || rig.reality.step_motor.holding_force_n.is_some()
+}
+
+/// The slider of an imperfection; none if it has none, or is not simulated on `rig`.
+fn of_imperfection(imperfection: &Imperfection, rig: &Rig) -> Option<Property> {
+    let slider = imperfection.slider.filter(|_| imperfection.not_on(rig).is_none())?;
+    Some(property(slider.name, slider.label, slider.unit, slider.range, Changed::Reality(slider.add), always))
 }
 
 /// The properties of a machine, and their current values.
@@ -132,7 +136,13 @@ pub struct Properties {
 impl Properties {
     /// The properties of `rig` as designed for, with the disturbances that its file expects.
     pub fn of(rig: &Rig) -> Self {
-        let all = Property::all_of(rig);
+        let others = OTHERS.into_iter().filter(|property| (property.acts)(rig));
+        let imperfections =
+            IMPERFECTIONS.iter().filter_map(|imperfection| of_imperfection(imperfection, rig));
+        let mut all: Vec<Property> = others.chain(imperfections).collect();
+        for property in all.iter_mut().filter(|property| property.name == FORCE_NOISE) {
+            property.nominal = Disturbance::of(rig).force_n;
+        }
         Self { values: all.iter().map(|property| property.nominal).collect(), all }
     }
 
@@ -145,9 +155,9 @@ impl Properties {
     /// such property.
     pub(crate) fn set(&mut self, name: &str, value: f64) -> Option<bool> {
         let index = self.all.iter().position(|property| property.name == name)?;
-        let Property { low, high, change, .. } = self.all[index];
+        let Property { low, high, changed, .. } = self.all[index];
         self.values[index] = value.clamp(low, high);
-        Some(!matches!(change, Changed::Signals))
+        Some(!matches!(changed, Changed::Signals))
     }
 
     /// Current value of a property, in its unit; 0 if there is no such property.
@@ -164,10 +174,8 @@ impl Properties {
     pub(crate) fn applied_to(&self, rig: &Rig) -> Rig {
         let mut rig = rig.clone();
         for (property, &value) in self.all.iter().zip(&self.values) {
-            match property.change {
-                Changed::Imperfection(imperfection, scale) => {
-                    imperfection.add(&mut rig.reality, scale * value)
-                }
+            match property.changed {
+                Changed::Reality(add) => add(&mut rig.reality, value),
                 Changed::Rig(apply) => apply(&mut rig, value),
                 Changed::Disturbance | Changed::Signals => {}
             }
@@ -183,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_slider_of_an_imperfection_adds_to_it_in_its_unit() {
+    fn every_slider_of_an_imperfection_adds_to_it_and_to_nothing_else() {
         let rigs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
         let rig = Rig::from_path(&rigs.join("quadruple-paper.toml")).unwrap();
         let mut number = 0;
@@ -194,8 +202,11 @@ mod tests {
             let [_, high, _] = slider.range;
             assert_eq!(properties.set(slider.name, 2.0 * high), Some(true), "the machine is built again");
             let mut with = rig.clone();
-            imperfection.add(&mut with.reality, slider.scale * high);
+            (slider.add)(&mut with.reality, high);
             assert!(with != rig && properties.applied_to(&rig) == with, "{}", imperfection.key);
+            // What is added is what a machine with this imperfection alone has.
+            (imperfection.set)(&mut with.reality, 0.0);
+            assert_eq!(with.reality, rig.reality, "{}", imperfection.key);
             let same = properties.described().iter().filter(|property| property.name == slider.name);
             assert_eq!(same.count(), 1, "{}", slider.name);
             number += 1;
@@ -211,7 +222,7 @@ mod tests {
             Properties::of(&rig).all().map(|(name, _)| name).collect()
         };
         assert_eq!(names("quadruple-paper.toml").len(), 13);
-        let all = ["mass", "joint-dry", "tilt", "joint-viscous", "air-drag", "coarseness"];
+        let all = ["mass", "joint-viscous", "air-drag", "coarseness", "joint-dry", "tilt"];
         assert_eq!(names("single-stepper.toml"), all);
     }
 }

@@ -35,12 +35,9 @@ pub struct Imperfection {
     /// The key in `[verify]`: the size that the loop has to survive.
     #[serde(skip)]
     pub(in crate::rig) required: Key,
-    /// Its place in `[reality]`.
+    /// Makes it the only imperfection of a machine without any, in its worst form.
     #[serde(skip)]
-    at: fn(&mut Reality) -> RealValue<'_>,
-    /// Sets what else of `[reality]` lets it act at its worst.
-    #[serde(skip)]
-    worst: fn(&mut Reality),
+    pub set: fn(&mut Reality, f64),
     /// For friction of the joints, the angles over which it may build up (rad): which is worse depends on the law.
     #[serde(skip)]
     pub bristles_rad: &'static [f64],
@@ -56,17 +53,6 @@ pub struct Imperfection {
     /// The slider of the twin that adds to it.
     #[serde(skip)]
     pub slider: Option<Slider>,
-}
-
-/// A value of `[reality]` that is the size of an imperfection.
-#[derive(Debug)]
-enum RealValue<'a> {
-    /// Of each joint.
-    EachJoint(&'a mut PerJoint),
-    /// Of the machine.
-    One(&'a mut f64),
-    /// Of the machine, if it is not that of another section.
-    OtherThanStated(&'a mut Option<f64>),
 }
 
 /// The largest size that can be simulated.
@@ -115,30 +101,11 @@ pub struct Slider {
     pub unit: &'static str,
     /// Lowest and highest value, and the step between values.
     pub range: [f64; 3],
-    /// One of its units in the unit of the imperfection.
-    pub scale: f64,
+    /// Adds this much, in its unit, to the imperfection.
+    pub add: fn(&mut Reality, f64),
 }
 
 impl Imperfection {
-    /// Makes it the only imperfection of a machine without any, in its worst form.
-    pub fn set(&self, reality: &mut Reality, size: f64) {
-        match (self.at)(reality) {
-            RealValue::EachJoint(values) => *values = PerJoint::all(size),
-            RealValue::One(value) => *value = size,
-            RealValue::OtherThanStated(value) => *value = Some(size),
-        }
-        (self.worst)(reality);
-    }
-
-    /// Makes it larger by `more`.
-    pub fn add(&self, reality: &mut Reality, more: f64) {
-        match (self.at)(reality) {
-            RealValue::EachJoint(values) => *values = values.plus(more),
-            RealValue::One(value) => *value += more,
-            RealValue::OtherThanStated(value) => *value = Some(value.unwrap_or_default() + more),
-        }
-    }
-
     /// Why it is not simulated with this drive and the motor of `reality`, if it is not.
     pub(crate) fn not_with(&self, actuator: &Actuator, reality: &Reality) -> Option<&'static str> {
         match self.drives {
@@ -172,43 +139,24 @@ impl PartialEq for Imperfection {
     }
 }
 
-impl<'a> From<&'a mut PerJoint> for RealValue<'a> {
-    fn from(values: &'a mut PerJoint) -> Self {
-        Self::EachJoint(values)
-    }
-}
-
-impl<'a> From<&'a mut f64> for RealValue<'a> {
-    fn from(value: &'a mut f64) -> Self {
-        Self::One(value)
-    }
-}
-
-impl<'a> From<&'a mut Option<f64>> for RealValue<'a> {
-    fn from(value: &'a mut Option<f64>) -> Self {
-        Self::OtherThanStated(value)
-    }
-}
-
-/// The part of a row that follows from its field of [`Reality`], with the unit, rule and meaning of its size.
+/// The part of a row that every imperfection has: key, unit, rule and meaning of its size, and how it is set.
 macro_rules! imperfection {
-    ($group:ident.$key:ident, $unit:literal, $rule:expr, $meaning:literal) => {
+    ($key:literal, $unit:literal, $rule:expr, $meaning:literal, $set:expr) => {
         Imperfection {
-            key: stringify!($key),
+            key: $key,
             unit: $unit,
             typical: [0.0; 2],
             source: "",
             remedy: "",
-            requirement: concat!("runs with the motor on (", stringify!($key), ")"),
+            requirement: concat!("runs with the motor on (", $key, ")"),
             required: Key {
-                name: stringify!($key),
+                name: $key,
                 unit: $unit,
                 rule: $rule,
                 meaning: concat!($meaning, " that the loop has to survive as the only imperfection"),
                 absent: Absent::Follows("not required"),
             },
-            at: |reality| (&mut reality.$group.$key).into(),
-            worst: |_| (),
+            set: $set,
             bristles_rad: &[],
             largest: LargestSize::Any,
             drives: SimulatedDrives::All,
@@ -232,9 +180,18 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
             label: "dry friction in each joint",
             unit: "mN·m more",
             range: [0.0, 20.0, 0.01],
-            scale: 1e-3,
+            add: |reality, more| {
+                let each = &mut reality.friction.joint_friction_n_m;
+                *each = each.plus(1e-3 * more);
+            },
         }),
-        ..imperfection!(friction.joint_friction_n_m, "N·m", Rule::POSITIVE, "Coulomb friction in each joint")
+        ..imperfection!(
+            "joint_friction_n_m",
+            "N·m",
+            Rule::POSITIVE,
+            "Coulomb friction in each joint",
+            |reality, size| reality.friction.joint_friction_n_m = PerJoint::all(size)
+        )
     },
     Imperfection {
         typical: [0.2, 2.0],
@@ -249,47 +206,71 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
             label: "dry friction of the cart",
             unit: "N more",
             range: [0.0, 5.0, 0.05],
-            scale: 1.0,
+            add: |reality, more| reality.friction.cart_friction_n += more,
         }),
-        ..imperfection!(friction.cart_friction_n, "N", Rule::POSITIVE, "Coulomb friction of the cart")
+        ..imperfection!(
+            "cart_friction_n",
+            "N",
+            Rule::POSITIVE,
+            "Coulomb friction of the cart",
+            |reality, size| reality.friction.cart_friction_n = size
+        )
     },
     Imperfection {
         typical: [1e-3, 1e-2],
         source: "a hanging link stops within F / (m g c) of the vertical: friction over weight times distance",
         remedy: "home while the links swing out; integral action brings the cart back",
         allowance: Some(Allowance::Tolerated(Tolerances::HOMING_ERROR)),
-        ..imperfection!(sensors.homing_error_rad, "rad", Rule::ANGLE, "error of each joint's zero")
+        ..imperfection!(
+            "homing_error_rad",
+            "rad",
+            Rule::ANGLE,
+            "error of each joint's zero",
+            |reality, size| reality.sensors.homing_error_rad = PerJoint::all(size)
+        )
     },
     Imperfection {
         typical: [1e-3, 5e-3],
         source: "2 e / D: a disk of 20 mm, 0.01 to 0.05 mm off its centre",
         remedy: "centre the disk; an encoder with its own bearing",
-        worst: |reality| reality.sensors.eccentricity_phase_rad = PerJoint::all(FRAC_PI_4),
         ..imperfection!(
-            sensors.eccentricity_rad,
+            "eccentricity_rad",
             "rad",
             Rule::ANGLE,
-            "amplitude of each joint encoder's once-per-turn error"
+            "amplitude of each joint encoder's once-per-turn error",
+            |reality, size| {
+                reality.sensors.eccentricity_rad = PerJoint::all(size);
+                reality.sensors.eccentricity_phase_rad = PerJoint::all(FRAC_PI_4);
+            }
         )
     },
     Imperfection {
         typical: [1e-3, 1.7e-2],
         source: "data sheets: 0.05° of an AS5048 that is linearised, to 1° of an AS5046 whose magnet is 0.7 mm off",
         remedy: "centre the magnet over the sensor; a stronger magnet, further from iron",
-        // Near upright, the reading moves by less than the link.
-        worst: |reality| reality.sensors.twice_per_turn_phase_rad = PerJoint::all(PI),
         ..imperfection!(
-            sensors.twice_per_turn_rad,
+            "twice_per_turn_rad",
             "rad",
             Rule::ANGLE,
-            "amplitude of each joint sensor's twice-per-turn error"
+            "amplitude of each joint sensor's twice-per-turn error",
+            |reality, size| {
+                reality.sensors.twice_per_turn_rad = PerJoint::all(size);
+                // Near upright, the reading moves by less than the link.
+                reality.sensors.twice_per_turn_phase_rad = PerJoint::all(PI);
+            }
         )
     },
     Imperfection {
         typical: [1e-4, 1e-3],
         source: "data sheets: 96 µs (AS5045, AS5046; slow 384 µs), to a filter or a slow bus (estimate)",
         remedy: "sensor_delay_s in [[link]], which is made up for; SPI instead of I²C; a faster clock of the bus",
-        ..imperfection!(sensors.sensor_delay_s, "s", Rule::POSITIVE, "age of the joints' readings")
+        ..imperfection!(
+            "sensor_delay_s",
+            "s",
+            Rule::POSITIVE,
+            "age of the joints' readings",
+            |reality, size| reality.sensors.sensor_delay_s = PerJoint::all(size)
+        )
     },
     Imperfection {
         typical: [5e-4, 5e-3],
@@ -300,16 +281,21 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
             label: "slope of the rail",
             unit: "°",
             range: [-5.0, 5.0, 0.1],
-            scale: PI / 180.0,
+            add: |reality, more| reality.sensors.rail_tilt_rad += more.to_radians(),
         }),
-        ..imperfection!(sensors.rail_tilt_rad, "rad", Rule::ANGLE, "slope of the rail")
+        ..imperfection!("rail_tilt_rad", "rad", Rule::ANGLE, "slope of the rail", |reality, size| reality
+            .sensors
+            .rail_tilt_rad =
+            size)
     },
     Imperfection {
         typical: [2e-5, 2e-4],
         source: "estimate: toothed belt under tension, to rack and pinion",
         remedy: "a tensioned belt instead of a rack; an encoder on the cart",
         drives: SimulatedDrives::OfForce("is not simulated between a stepper and its cart"),
-        ..imperfection!(drive_train.backlash_m, "m", Rule::POSITIVE, "play between motor and cart")
+        ..imperfection!("backlash_m", "m", Rule::POSITIVE, "play between motor and cart", |reality, size| {
+            reality.drive_train.backlash_m = size
+        })
     },
     Imperfection {
         typical: [2e-6, 2e-5],
@@ -317,10 +303,11 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
         remedy: "a wider or shorter belt, or one with steel cords",
         drives: SimulatedDrives::OfForce("is not simulated between a stepper and its cart"),
         ..imperfection!(
-            drive_train.belt_compliance_m_per_n,
+            "belt_compliance_m_per_n",
             "m/N",
             Rule::POSITIVE,
-            "stretch of belt or gear per force"
+            "stretch of belt or gear per force",
+            |reality, size| reality.drive_train.belt_compliance_m_per_n = size
         )
     },
     Imperfection {
@@ -335,10 +322,11 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
             at: |actuator| Some(&mut actuator.force_mut()?.lag_s),
         }),
         ..imperfection!(
-            driver.driver_lag_s,
+            "driver_lag_s",
             "s",
             Rule::POSITIVE,
-            "time constant of the motor driver, beyond the stated one,"
+            "time constant of the motor driver, beyond the stated one,",
+            |reality, size| reality.driver.driver_lag_s = Some(size)
         )
     },
     Imperfection {
@@ -351,10 +339,11 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
         // The simulated force begins within its tick.
         largest: LargestSize::Tick,
         ..imperfection!(
-            driver.latency_s,
+            "latency_s",
             "s",
             Rule::POSITIVE.worded("a number > 0 and < period_s"),
-            "additional delay of the force"
+            "additional delay of the force",
+            |reality, size| reality.driver.latency_s = size
         )
     },
     Imperfection {
@@ -369,9 +358,11 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
             label: "force of the motor",
             unit: "% more",
             range: [-100.0, 100.0, 1.0],
-            scale: 1.0,
+            add: |reality, more| reality.driver.force_percent += more,
         }),
-        ..imperfection!(driver.force_percent, "%", Rule::POSITIVE, "excess of the real force")
+        ..imperfection!("force_percent", "%", Rule::POSITIVE, "excess of the real force", |reality, size| {
+            reality.driver.force_percent = size
+        })
     },
     Imperfection {
         typical: [0.5, 5.0],
@@ -381,10 +372,11 @@ pub static IMPERFECTIONS: [Imperfection; 13] = [
         largest: LargestSize::Of(80.0),
         allowance: Some(Allowance::Tolerated(Tolerances::MASS)),
         ..imperfection!(
-            parameters.parameter_spread_percent,
+            "parameter_spread_percent",
             "%",
             Rule::SPREAD,
-            "spread (±) of all masses, lengths and inertias"
+            "spread (±) of all masses, lengths and inertias",
+            |reality, size| reality.parameters.parameter_spread_percent = size
         )
     },
 ];
