@@ -304,7 +304,7 @@ fn every_imperfection_is_a_key_of_reality() {
     assert!(!known("joint_friction_n_m", "N"));
     let verify = SECTIONS.iter().find(|section| section.name == "verify").unwrap();
     let required = |key: &str, unit: &str| verify.keys().any(|one| one.name == key && one.unit == unit);
-    for one in &IMPERFECTIONS {
+    for one in IMPERFECTIONS {
         assert!(required(one.key, one.unit), "{}", one.key);
         assert_eq!(one.requirement, format!("runs with the motor on ({})", one.key));
     }

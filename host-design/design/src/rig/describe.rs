@@ -11,7 +11,7 @@ use super::key::{Absent, Key, Section};
 use super::sections::actuator::ACTUATOR;
 use super::sections::chain::{CART, GRAVITY};
 use super::sections::friction::FRICTION;
-use super::sections::imperfections::IMPERFECTIONS;
+use super::sections::imperfections::REQUIRED_SIZES;
 use super::sections::integral::INTEGRAL;
 use super::sections::limits::LIMITS;
 use super::sections::link::LINK;
@@ -46,9 +46,9 @@ impl Rig {
         page.design(self);
         page.section(&LIMITS, &self.limits);
         page.section(&VERIFY, &self.verify);
-        for imperfection in &IMPERFECTIONS {
-            let size = self.must_survive.iter().find(|(required, _)| *required == imperfection);
-            page.row(&VERIFY, &imperfection.required, size.map(|&(_, size)| size).as_slice());
+        for key in REQUIRED_SIZES {
+            let size = self.must_survive.iter().find(|(imperfection, _)| imperfection.key == key.name);
+            page.row(&VERIFY, key, size.map(|&(_, size)| size).as_slice());
         }
         page.reality(&self.reality);
         if let Some(tolerances) = &self.robust {

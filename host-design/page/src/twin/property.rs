@@ -112,7 +112,7 @@ fn always(_: &Rig) -> bool {
 }
 
 fn imposes_force(rig: &Rig) -> bool {
-    !rig.actuator.held().is_motion()
+    rig.actuator.input().is_force()
 }
 
 /// The cart of a drive that takes pulses goes where they say; forces on it matter only if `[reality]` has the motor.
@@ -195,7 +195,7 @@ mod tests {
         let rigs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
         let rig = Rig::from_path(&rigs.join("quadruple-paper.toml")).unwrap();
         let mut number = 0;
-        for imperfection in &IMPERFECTIONS {
+        for imperfection in IMPERFECTIONS {
             let Some(slider) = imperfection.slider else { continue };
             let mut properties = Properties::of(&rig);
             assert_eq!(properties.applied_to(&rig), rig, "negative control");

@@ -15,7 +15,7 @@ pub(crate) static VERIFY: Section = Section {
     title: "[verify]",
     meaning: "what `upright verify` requires of each law; changes no gain",
     absent: Absent::Follows("as below"),
-    keys: &[Requirements::KEYS, &REQUIRED_SIZES],
+    keys: &[Requirements::KEYS, REQUIRED_SIZES],
 };
 
 keys! {
@@ -67,7 +67,7 @@ pub(crate) fn verify(
     let table = node.table(&VERIFY)?;
     let requirements = Requirements::read(&table)?;
     let mut sizes = Vec::new();
-    for imperfection in &IMPERFECTIONS {
+    for imperfection in IMPERFECTIONS {
         if imperfection.not_with(actuator, reality).is_some() {
             table.refuse_for_acceleration(&[imperfection.key])?;
         }
