@@ -1,9 +1,9 @@
-//! Gains of the rig `quadruple-paper`, written by `upright design`; do not edit.
-//!
-//! Every gain is the exact answer of its design problem, rounded once to f32.
-//!
-//! - states: cart position (m), cart speed (m/s), angle of link 1 (rad), angular rate of link 1 (rad/s), angle of link 2 (rad), angular rate of link 2 (rad/s), angle of link 3 (rad), angular rate of link 3 (rad/s), angle of link 4 (rad), angular rate of link 4 (rad/s)
-//! - sensors: cart position (m), angle of link 1 (rad), angle of link 2 (rad), angle of link 3 (rad), angle of link 4 (rad)
+// Gains of the rig `quadruple-paper`, written by `upright design`; do not edit.
+//
+// Every gain is the exact answer of its design problem, rounded once to f32.
+//
+// - states: cart position (m), cart speed (m/s), angle of link 1 (rad), angular rate of link 1 (rad/s), angle of link 2 (rad), angular rate of link 2 (rad/s), angle of link 3 (rad), angular rate of link 3 (rad/s), angle of link 4 (rad), angular rate of link 4 (rad/s)
+// - sensors: cart position (m), angle of link 1 (rad), angle of link 2 (rad), angle of link 3 (rad), angle of link 4 (rad)
 
 use upright::table::*;
 

@@ -100,8 +100,7 @@ fn compile(subcommand: &str, machines: &[&Machine], arguments: &[&str]) -> Resul
         [("UPRIGHT_QUADRUPLE", "quadruple-paper"), ("UPRIGHT_SINGLE", "single-quanser-ip02")]
     {
         let (rig, table) = rig_and_table_with_motions(rig);
-        // An included file cannot have module documentation.
-        let source = gains_source(rig, table).replace("//!", "//");
+        let source = gains_source(rig, table);
         let path = target_directory.join(variable).with_extension("rs");
         if std::fs::read_to_string(&path).ok().as_ref() != Some(&source) {
             std::fs::create_dir_all(&target_directory).unwrap();

@@ -10,7 +10,8 @@ use super::contents::{Field, TableNode, TableNumber};
 use super::values::TableValues;
 use crate::rig::{PlantDescription, Rig};
 
-/// The source of a `gains.rs` for `table`, designed from `rig`. It compiles in any crate that depends on `upright`.
+/// The source of a `gains.rs` for `table`, designed from `rig`. It compiles in any crate that depends on `upright`, as a
+/// module or included in one: so it begins with comments that are no documentation.
 pub fn gains_source(rig: &Rig, table: &TableValues) -> String {
     let mut out = String::new();
     // Writing into a String cannot fail.
@@ -40,12 +41,12 @@ pub fn identity_differences(found: &str, wanted: &str) -> Vec<String> {
 fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::Result {
     let states = state_names(rig);
     let sensors: Vec<&str> = table.measured().into_iter().map(|state| states[state].as_str()).collect();
-    writeln!(out, "//! Gains of the rig `{}`, written by `upright design`; do not edit.", table.rig)?;
-    writeln!(out, "//!")?;
-    writeln!(out, "//! Every gain is the exact answer of its design problem, rounded once to f32.")?;
-    writeln!(out, "//!")?;
-    writeln!(out, "//! - states: {}", states.join(", "))?;
-    writeln!(out, "//! - sensors: {}\n", sensors.join(", "))?;
+    writeln!(out, "// Gains of the rig `{}`, written by `upright design`; do not edit.", table.rig)?;
+    writeln!(out, "//")?;
+    writeln!(out, "// Every gain is the exact answer of its design problem, rounded once to f32.")?;
+    writeln!(out, "//")?;
+    writeln!(out, "// - states: {}", states.join(", "))?;
+    writeln!(out, "// - sensors: {}\n", sensors.join(", "))?;
     writeln!(out, "use upright::table::*;\n")?;
     let mut constant = |doc: &str, name: &str, kind: &str, value: &str| {
         writeln!(out, "/// {doc}\npub const {name}: {kind} = {value};\n")

@@ -35,16 +35,14 @@ pub fn build_for(board: BoardName, rig: &Rig, table: &TableValues) -> Result<Pat
     check_board(board, table.sensors(), rig.tick.period_s, table.drive.pulses())?;
     reads_all(board, table)?;
     let source = gains_source(rig, table);
-    // An included file cannot have module documentation.
-    let included = source.lines().filter(|line| !line.starts_with("//!")).collect::<Vec<_>>().join("\n");
     let mut name = format!("{}-{:016x}-{:08x}", board.name(), rig.hash(), table.crc());
     if let Some(crc) = table.swing_up_crc() {
         name += &format!("-{crc:08x}");
     }
     let gains = images()?.join(format!("{name}.rs"));
     // An unchanged file stays as it is, so that nothing is compiled again.
-    if std::fs::read_to_string(&gains).ok().as_deref() != Some(&included) {
-        write_atomically(&gains, included.as_bytes())?;
+    if std::fs::read_to_string(&gains).ok().as_deref() != Some(&source) {
+        write_atomically(&gains, source.as_bytes())?;
     }
     compile(board, Some(&gains), &name)
 }

@@ -46,8 +46,7 @@ pub fn build_pico(board: PicoBoard, rig: &Rig, table: &TableValues) -> Result<Pi
         table.swing_up_crc().unwrap_or_default()
     );
     let gains = images()?.join(format!("{name}.rs"));
-    // An included file cannot have module documentation.
-    let source = gains_source(rig, table).replace("//!", "//");
+    let source = gains_source(rig, table);
     if std::fs::read_to_string(&gains).ok().as_ref() != Some(&source) {
         write_atomically(&gains, source.as_bytes())?;
     }
