@@ -3,10 +3,15 @@
 //! It balances the rig of the committed table. Here the machine is its equations of motion; yours has counters and a
 //! motor. Nothing looks after limits, signs, homing, a fall or a broken wire: that is what `Firmware` is for.
 
-use nalgebra::{SMatrix, SVector};
+// Yours is `mod gains;`, as `upright design` has written it.
+#[path = "../src/gains.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a table of which not all is needed")]
+mod gains;
+
+use gains::{SENSORS, STATES, TABLE, TICK_S};
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
-use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
+use upright::nalgebra::{SMatrix, SVector};
 use upright::table::ChainModel;
 
 const LINKS: usize = SENSORS - 1;

@@ -7,22 +7,23 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`table`] | the gain table: its fields, its checksum, limits and thresholds |
-//! | [`gains`] | the generated gain table of one rig |
 //! | [`plant`] | nonlinear equations of motion, shared with the host |
 //! | [`control`] | encoders, observer, state feedback, actuator, and the controller that joins them |
 //! | [`supervision`] | states, faults, what prevents arming, homing, sign check, limits, fault detection |
 //! | [`protocol`] | messages, frames, the serial link |
 //! | [`board`] | the trait that a board implements: inputs of a tick, output to the motor |
+//! | [`boards`] | the boards that there is an image for |
 //! | [`flash_image`] | the checksum that an image in flash carries |
 //! | [`firmware`] | one tick of all of the above, and the control task that a timer starts |
 //!
 //! The whole firmware, as a control task runs it: the motor stays off until nothing prevents arming any more.
 //!
 //! ```
+//! # mod gains { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/gains.rs")); }
+//! use gains::{SENSORS, SWING_UP, TABLE}; // written by `upright design`
 //! use upright::board::{Contacts, Inputs};
 //! use upright::control::encoder::CounterWidth;
 //! use upright::firmware::Firmware;
-//! use upright::gains::{SENSORS, SWING_UP, TABLE};
 //! use upright::protocol::message::{Answer, Command, Request, Reset};
 //! use upright::supervision::inhibits::Inhibits;
 //!
@@ -39,9 +40,10 @@
 //! The controller alone, from encoder counts; [`control`] shows it with positions in SI units:
 //!
 //! ```
+//! # mod gains { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/gains.rs")); }
+//! use gains::{SENSORS, TABLE}; // written by `upright design`
 //! use upright::control::controller::Controller;
 //! use upright::control::encoder::CounterWidth;
-//! use upright::gains::{SENSORS, TABLE};
 //!
 //! let mut controller = Controller::new(&TABLE, [CounterWidth::Bits32; SENSORS])?;
 //! controller.start(&[0; SENSORS])?; // upright and at rest, all counters at 0
@@ -54,6 +56,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Where to begin
+//!
+//! `upright design RIG --out src/gains.rs` (of the package `upright-tool`) writes a rig's table for your crate. Your
+//! board implements [`Board`](board::Board). A whole program is
+//! [`examples/own-board`](https://docs.rs/crate/upright/latest/source/examples/own-board/); the repository explains
+//! it in `docs/own-board.md`. `default-features = false` leaves the [controller](control) alone, without supervisor,
+//! messages and their dependencies.
+//!
 //! State order, for n links: `x, ẋ, θ₁, θ̇₁, …, θₙ, θ̇ₙ` with angles relative to the previous link, counter-clockwise
 //! positive, 0 upright; force positive along +x. SI units throughout.
 
@@ -65,17 +75,25 @@ extern crate self as upright;
 #[cfg(test)]
 extern crate std;
 
+// Their types are in the signatures of this crate.
+#[cfg(feature = "firmware")]
+pub use heapless;
+pub use nalgebra;
+
 #[cfg(feature = "firmware")]
 pub mod board;
+#[cfg(feature = "firmware")]
+pub mod boards;
 pub mod control;
 #[cfg(feature = "firmware")]
 pub mod firmware;
 #[cfg(feature = "firmware")]
 pub mod flash_image;
-#[cfg(not(feature = "gains-from-env"))]
+#[cfg(all(test, not(feature = "image")))]
+#[allow(missing_docs)]
 pub mod gains;
-#[cfg(feature = "gains-from-env")]
-/// Gains of a rig other than the committed one, for an image that the host tool builds to try them.
+#[cfg(feature = "image")]
+/// The gain table of the image: the file that the environment variable UPRIGHT_GAINS names.
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }

@@ -6,10 +6,10 @@
 
 use std::sync::OnceLock;
 
+use crate::gains::{SENSORS, STATES, TABLE};
 use heapless::spsc::Queue;
 use upright::board::Contacts;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
-use upright::gains::{SENSORS, STATES, TABLE};
 use upright::protocol::frame::{Receiver, encode};
 use upright::protocol::message::{Command, Message, Reply, Request};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE, SerialLink};

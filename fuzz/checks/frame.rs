@@ -1,8 +1,8 @@
 //! Bytes from a serial line: whatever message is read from them is read again, unchanged, from a frame of its own.
 
+use crate::gains::{SENSORS, STATES};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::{Receiver, encode};
 use upright::protocol::message::{Command, Message};
 use upright::protocol::serial_link::{MAX_COMMAND, MAX_MESSAGE};

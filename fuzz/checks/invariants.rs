@@ -3,9 +3,9 @@
 
 use std::collections::VecDeque;
 
+use crate::gains::{SENSORS, STATES, TABLE};
 use upright::board::Output;
 use upright::control::actuator::Drive;
-use upright::gains::{SENSORS, STATES, TABLE};
 use upright::protocol::message::{Answer, Request, Telemetry};
 use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::jog::MotorSign;

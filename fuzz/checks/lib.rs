@@ -4,6 +4,9 @@
 
 pub mod commands;
 pub mod frame;
+#[path = "../../src/gains.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a table of which not all is needed")]
+mod gains;
 mod invariants;
 #[cfg(feature = "design")]
 pub mod log;

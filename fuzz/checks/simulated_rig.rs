@@ -1,11 +1,11 @@
 //! A board with a rig behind it that is cheap to simulate: the observer's own model while the motor is on, a hand that
 //! holds the rig while it is off.
 
+use crate::gains::{SENSORS, STATES, TABLE, TICK_S};
 use upright::board::{Board, Contacts, Inputs, Output};
 use upright::control::actuator::Drive;
 use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
-use upright::gains::{SENSORS, STATES, TABLE, TICK_S};
 use upright::protocol::message::{Answer, Command, Request, Reset};
 use upright::supervision::jog::MotorSign;
 use upright::supervision::shaking::{FORCES, Shaking};

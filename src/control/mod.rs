@@ -4,9 +4,10 @@
 //! else's driver. The same positions give the same bits:
 //!
 //! ```
+//! # mod gains { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/gains.rs")); }
+//! use gains::{SENSORS, TABLE};
 //! use upright::control::controller::Controller;
 //! use upright::control::encoder::CounterWidth;
-//! use upright::gains::{SENSORS, TABLE};
 //!
 //! let mut controller = Controller::new(&TABLE, [CounterWidth::Bits32; SENSORS])?;
 //! let mut positions = [0.0; SENSORS]; // metres, radians

@@ -4,10 +4,11 @@
 //! to a board and to the serial link.
 //!
 //! ```
+//! # mod gains { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/gains.rs")); }
+//! use gains::{SENSORS, SWING_UP, TABLE};
 //! use upright::board::{Contacts, Inputs};
 //! use upright::control::encoder::CounterWidth;
 //! use upright::firmware::Firmware;
-//! use upright::gains::{SENSORS, SWING_UP, TABLE};
 //! use upright::protocol::message::Reset;
 //! use upright::supervision::fault::Fault;
 //! use upright::supervision::supervisor::State;
@@ -26,6 +27,7 @@ mod bad_samples;
 mod balancing;
 mod commands;
 pub mod control_task;
+#[cfg(feature = "image")]
 #[cfg(feature = "image")]
 pub mod hot_path;
 mod idle_drive;

@@ -13,11 +13,19 @@
 
 mod board;
 
-// The registers of the board's chip.
-#[cfg(not(feature = "nucleo-f446"))]
+// The registers of the chip.
+#[cfg(feature = "stm32f405")]
 use stm32f4::stm32f405 as pac;
-#[cfg(feature = "nucleo-f446")]
+#[cfg(feature = "stm32f446")]
 use stm32f4::stm32f446 as pac;
+
+#[cfg(not(any(feature = "stm32f405", feature = "stm32f446")))]
+compile_error!(
+    "the image has no chip: build it with `cargo upright firmware build --board BOARD`, or choose one of the features \
+     stm32f405, stm32f446"
+);
+#[cfg(all(feature = "stm32f405", feature = "stm32f446"))]
+compile_error!("the image has two chips: choose only one of the features stm32f405, stm32f446");
 
 use upright::gains;
 
@@ -31,11 +39,11 @@ const CYCLES_PER_TICK: u32 = {
 
 #[rtic::app(device = crate::pac, peripherals = true)]
 mod app {
-    use heapless::spsc::Queue;
     use upright::board::Board;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
     use upright::firmware::{Firmware, hot_path};
     use upright::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
+    use upright::heapless::spsc::Queue;
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
     use upright::table::GainTable;

@@ -4,7 +4,8 @@
 //! [`supervision`](crate::supervision) use them. A gain table in another crate imports only this module.
 //!
 //! ```
-//! use upright::gains::TABLE;
+//! # mod gains { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/gains.rs")); }
+//! use gains::TABLE;
 //! use upright::table::{Law, TableError};
 //!
 //! TABLE.check()?;

@@ -1,8 +1,8 @@
 //! The firmware's controller against the nonlinear plant: every loop that has to stay upright does so.
 
 use crate::bench::*;
+use crate::gains::{STATES, TABLE};
 use upright::control::controller::Controller;
-use upright::gains::{STATES, TABLE};
 use upright::table::Law;
 use upright_design::simulate::{Bench, Scenario, Summary, simulate};
 

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
+use upright::boards::BoardRow;
 use upright_design::rig::Rig;
 use upright_design::table::{TableValues, gains_source};
 use upright_test_support::limits::output;
 use upright_test_support::repository;
-use upright_tool::image::{BoardName, BuildError, Compiler, PROFILE, TARGET, build_for, compiler};
+use upright_tool::image::{BuildError, Compiler, PROFILE, TARGET, build_for, compiler};
 
 /// What was built or found; `None` if it needs the missing compiler for the image. `what` it is for.
 pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Option<T> {
@@ -15,8 +16,8 @@ pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Optio
 }
 
 /// The image with this table.
-pub(crate) fn built_for(board: BoardName, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
-    if_possible(build_for(board, rig, table), "an image")
+pub(crate) fn built_for(board: &'static BoardRow, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
+    if_possible(build_for(board, rig, table), "an image").map(|image| image.elf)
 }
 
 /// Builds the crate in this folder of `boards/` with a table; returns the folder of what was built.

@@ -1,9 +1,9 @@
 //! `src/gains.rs` is what the tool writes for its rig, and what the firmware accepts.
 
 use crate::bench::{rig_of_the_firmware, table};
+use crate::gains::{RIG, RIG_HASH, SENSORS, STATES, TABLE, TICK_S, TOOL_VERSION};
 use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
-use upright::gains::{RIG, RIG_HASH, SENSORS, STATES, TABLE, TICK_S, TOOL_VERSION};
 use upright::table::TableError;
 use upright_design::rig::Rig;
 use upright_design::table::gains_source;

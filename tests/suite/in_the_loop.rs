@@ -8,6 +8,7 @@ use std::fmt::Write;
 
 use crate::equipment::built_for;
 use crate::published::{rig, rig_and_table, rig_path, stored_motions, table};
+use upright::boards::DEFAULT_BOARD;
 use upright::protocol::message::Request;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
@@ -18,7 +19,7 @@ use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, simulate};
 use upright_design::table::TableValues;
 use upright_plan::{Route, StoredTransitions, with_motions};
-use upright_tool::image::BoardName;
+use upright_tool::image::conditions;
 use upright_tool::in_the_loop::{Compared, RunPlace, VirtualBoard, run, run_compared};
 
 fn quadruple() -> (Rig, TableValues) {
@@ -56,12 +57,12 @@ pub(crate) fn scenarios(rig: &Rig, disturbed: bool) -> Vec<(String, Scenario)> {
 
 /// The image with this table, if its compiler is installed.
 fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
-    let elf = built_for(BoardName::WeactF405, rig, table)?;
+    let elf = built_for(DEFAULT_BOARD, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
 fn powered_on(image: &Image, table: &TableValues) -> VirtualBoard {
-    VirtualBoard::start(image, &BoardName::WeactF405.conditions(1), table).unwrap()
+    VirtualBoard::start(image, &conditions(DEFAULT_BOARD, 1).unwrap(), table).unwrap()
 }
 
 fn forces_and_estimates(recording: &Recording) -> Vec<(f64, f64, Vec<f64>)> {

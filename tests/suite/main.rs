@@ -15,6 +15,9 @@ mod embassy;
 mod encoders_only;
 mod equipment;
 mod fuzz_corpus;
+#[path = "../../src/gains.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a table of which not all is needed")]
+mod gains;
 mod gains_table;
 mod governor;
 mod homing;

@@ -6,18 +6,18 @@ use core::cell::UnsafeCell;
 use core::mem::offset_of;
 use core::panic::PanicInfo;
 
-use heapless::spsc::Queue;
 use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 use upright::control::encoder::CounterWidth;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
+use upright::heapless::spsc::Queue;
 use upright::protocol::message::{Command, Message, Reset};
 use upright::protocol::serial_link::SerialLink;
 
-/// The table of the rig.
-#[allow(dead_code)]
+/// The gain table in the file that UPRIGHT_GAINS names.
+#[allow(dead_code, reason = "an image does not need its name")]
 mod gains {
-    include!(concat!(env!("OUT_DIR"), "/gains.rs"));
+    include!(env!("UPRIGHT_GAINS"));
 }
 
 use gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};

@@ -11,8 +11,11 @@
 #![no_main]
 
 mod board;
-
-use upright::gains;
+/// The gain table in the file that UPRIGHT_GAINS names.
+#[allow(dead_code, reason = "an image does not need its name")]
+mod gains {
+    include!(env!("UPRIGHT_GAINS"));
+}
 
 /// Processor cycles per tick, at the period for which the gains were designed.
 const CYCLES_PER_TICK: u32 = {
@@ -24,11 +27,11 @@ const CYCLES_PER_TICK: u32 = {
 
 #[rtic::app(device = hal::pac, peripherals = true)]
 mod app {
-    use heapless::spsc::Queue;
+    use crate::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
     use upright::board::Board;
     use upright::firmware::Firmware;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
-    use upright::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
+    use upright::heapless::spsc::Queue;
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
 

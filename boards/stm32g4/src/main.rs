@@ -11,10 +11,10 @@
 #![no_main]
 
 mod board;
-/// The table in the file that UPRIGHT_GAINS names.
+/// The gain table in the file that UPRIGHT_GAINS names.
 #[allow(dead_code, reason = "an image does not need its name")]
 mod gains {
-    include!(concat!(env!("OUT_DIR"), "/gains.rs"));
+    include!(env!("UPRIGHT_GAINS"));
 }
 
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -31,12 +31,12 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peripherals, bind_interrupts, pac, rcc};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use heapless::spsc::Queue;
 use panic_halt as _;
 use static_cell::{ConstStaticCell, StaticCell};
 use upright::board::Board;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
+use upright::heapless::spsc::Queue;
 use upright::protocol::message::{Command, Message, Reset};
 use upright::protocol::serial_link::SerialLink;
 

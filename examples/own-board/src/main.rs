@@ -6,7 +6,6 @@
 mod board;
 
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
-use heapless::spsc::Queue;
 use own_board::gains::{SWING_UP, TABLE, TICK_S};
 use panic_halt as _;
 use stm32f4xx_hal::adc::{Adc, config::AdcConfig};
@@ -18,6 +17,7 @@ use stm32f4xx_hal::{prelude::*, qei::Qei};
 use upright::board::Board;
 use upright::firmware::Firmware;
 use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
+use upright::heapless::{Deque, spsc::Queue};
 use upright::protocol::message::Reset;
 use upright::protocol::serial_link::SerialLink;
 
@@ -68,7 +68,7 @@ fn run(board: OwnBoard, mut timer: SYST, line: Serial<USART1>) -> ! {
     timer.set_reload((TICK_S * CLOCK_HZ as f32) as u32 - 1);
     timer.clear_current();
     timer.enable_counter();
-    let mut frame = heapless::Deque::<u8, 512>::new();
+    let mut frame = Deque::<u8, 512>::new();
     let mut due = false;
     loop {
         due |= timer.has_wrapped();

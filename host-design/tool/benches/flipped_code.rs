@@ -4,6 +4,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use upright::boards::DEFAULT_BOARD;
 use upright::control::actuator::Drive;
 use upright::table::Law;
 use upright_board::{Conditions, Image, Input};
@@ -12,7 +13,7 @@ use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{BoardName, build_for};
+use upright_tool::image::build_for;
 use upright_tool::in_the_loop::{Event, VirtualBoard};
 
 /// Number of bits, each in a run of its own.
@@ -62,8 +63,8 @@ fn balanced(rig: &Rig, table: &TableValues, image: &Image, flip: Option<(usize, 
 fn main() {
     let rig = Rig::from_path("../../rigs/quadruple-paper.toml".as_ref()).unwrap();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    let elf = build_for(BoardName::WeactF405, &rig, &table).unwrap();
-    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let built = build_for(DEFAULT_BOARD, &rig, &table).unwrap();
+    let image = Image::from_elf(&std::fs::read(built.elf).unwrap()).unwrap();
     let sound = balanced(&rig, &table, &image, None);
     assert_eq!(sound.len(), FLIPS.end + LONGEST + 1, "the rig does not balance");
     let mut random = Pcg64::seed_from_u64(1);

@@ -1,13 +1,14 @@
 //! What a tick with 30 states costs on the virtual board: `cargo bench -p upright-tool --bench thirty_states`. Fails if
 //! it takes more than a quarter of its period. The design takes half a minute.
 
+use upright::boards::DEFAULT_BOARD;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{BoardName, build_for};
+use upright_tool::image::build_for;
 use upright_tool::in_the_loop::measure;
 
 /// A linear model of 30 states, the most that a table holds: a cart and 14 oscillators, two of them measured.
@@ -33,8 +34,8 @@ fn main() {
     let rig = thirty_states();
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     assert_eq!(table.states(), 30);
-    let elf = build_for(BoardName::WeactF405, &rig, &table).unwrap();
-    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let built = build_for(DEFAULT_BOARD, &rig, &table).unwrap();
+    let image = Image::from_elf(&std::fs::read(built.elf).unwrap()).unwrap();
     let scenario = Scenario { duration_s: 0.5, force_noise_n: 0.1, ..Scenario::at_rest(&rig, Law::Lqr) };
     let cycles = measure(&rig, &table, &scenario, &image, &Conditions::f405(1)).unwrap();
     println!("{cycles:#?}");

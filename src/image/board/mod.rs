@@ -1,6 +1,6 @@
 //! The board of this image: the only code that accesses registers, and the only code with `unsafe`.
 //!
-//! A cargo feature selects the board. A new board is a folder beside `f4` that provides the same names: `set_up` makes
+//! A family of boards is a folder such as `f4`. Another one would provide the same names: `set_up` makes
 //! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes,
 //! and a [`MemoryCheck`] that finds memory that has changed; `start_ticks` starts the interrupt of the control task,
 //! and `sleep` waits for an interrupt; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock, `TICK_US` the
@@ -10,38 +10,13 @@
 
 use cortex_m::register::control::{self, Fpca};
 
-macro_rules! one_board {
-    ($($board:tt)*) => {
-        #[cfg(not(any($(feature = $board),*)))]
-        compile_error!(concat!(
-            "the image has no board: choose one with `cargo upright firmware build --board BOARD`, or with one of the \
-             features",
-            $(" ", $board),*
-        ));
-        at_most_one_board!($($board)*);
-    };
-}
-
-macro_rules! at_most_one_board {
-    () => {};
-    ($board:tt $($other:tt)*) => {
-        $(
-            #[cfg(all(feature = $board, feature = $other))]
-            compile_error!(concat!("the image has two boards: choose only one of the features ", $board, ", ", $other));
-        )*
-        at_most_one_board!($($other)*);
-    };
-}
-
-one_board!("weact-f405" "olimex-h405" "feather-f405" "discovery-f407" "nucleo-f446");
-
 mod f4;
 mod handlers;
 
 use f4::sleep;
 pub(crate) use f4::{
-    CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Board as Hardware, MemoryCheck, TICK_US, set_up,
-    start_ticks, stop,
+    CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Hardware as Hardware, MemoryCheck, TICK_US,
+    set_up, start_ticks, stop,
 };
 pub(crate) use handlers::stop_for_memory;
 

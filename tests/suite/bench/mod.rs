@@ -14,7 +14,7 @@ pub(crate) const LAWS: [Law; 2] = Law::ALL;
 
 /// The rig whose gains are in `src/gains.rs`: the one with that name in `rigs/`, whatever its file is called.
 pub(crate) fn rig_of_the_firmware() -> Rig {
-    let wanted = upright::gains::RIG;
+    let wanted = crate::gains::RIG;
     std::fs::read_dir(upright_test_support::repository().join("rigs"))
         .unwrap()
         .map(|entry| entry.unwrap().path())

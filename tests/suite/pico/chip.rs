@@ -8,12 +8,13 @@ use serde_json::{Value, json};
 
 use super::recorded::{Recorded, steps};
 use crate::equipment::if_possible;
+use upright::boards::named;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_test_support::equipment::{is_required, not_exercised};
 use upright_test_support::limits::{Lines, Running};
 use upright_test_support::repository;
-use upright_tool::image::{PicoBoard, build_pico};
+use upright_tool::image::build_for;
 
 /// The outputs of the chip after a tick, and what it has sent since the tick before.
 pub(super) struct Answer {
@@ -64,7 +65,8 @@ pub(super) fn uf2_with_motions(rig: &Rig, table: &TableValues) -> Option<PathBuf
         not_exercised("the image for a Pico: run `npm ci` in boards/rp2040/harness");
         return None;
     }
-    Some(if_possible(build_pico(PicoBoard::Pico, rig, table), "the image for a Pico")?.uf2)
+    let pico = named("pico").unwrap();
+    Some(if_possible(build_for(pico, rig, table), "the image for a Pico")?.uf2.unwrap())
 }
 
 impl Chip {

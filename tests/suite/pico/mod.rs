@@ -13,13 +13,14 @@ use crate::chips::recorded::stand_still;
 use crate::equipment::if_possible;
 use crate::published::{rig_and_table, rig_and_table_with_motions};
 use upright::board::Output;
+use upright::boards::named;
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright::table::Law;
 use upright_closed_loop::harness::Pins;
 use upright_design::simulate::Scenario;
 use upright_plan::up_and_down;
-use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, PicoBoard, build_pico};
+use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, build_for};
 
 /// Stack of the image (bytes), as `boards/rp2040/image.x` has it.
 const STACK: u32 = 8192;
@@ -243,10 +244,10 @@ fn a_table_or_code_that_is_damaged_before_power_comes_keeps_the_motor_off() {
 #[ignore = "builds the image"]
 fn the_image_for_a_pico_2_has_what_its_boot_rom_looks_for() {
     let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
-    let built = |board| if_possible(build_pico(board, rig, table), "the image for a Pico 2");
-    let Some(image) = built(PicoBoard::Pico2) else { return };
+    let built = |board| if_possible(build_for(named(board).unwrap(), rig, table), "the image for a Pico 2");
+    let Some(image) = built("pico2") else { return };
     // The blocks of the UF2 file, each with a page of the flash.
-    let uf2 = std::fs::read(image.uf2).unwrap();
+    let uf2 = std::fs::read(image.uf2.unwrap()).unwrap();
     let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     assert!(uf2.chunks(512).all(|block| word(block, 28) == 0xe48b_ff59));
     let flash: Vec<u8> = uf2.chunks(512).flat_map(|block| block[32..288].iter().copied()).collect();
@@ -260,6 +261,6 @@ fn the_image_for_a_pico_2_has_what_its_boot_rom_looks_for() {
     };
     assert!(says_what_it_is(&flash));
     // Negative control: what another chip looks for.
-    let Some(pico) = built(PicoBoard::Pico) else { return };
-    assert!(!says_what_it_is(&std::fs::read(pico.uf2).unwrap()));
+    let Some(pico) = built("pico") else { return };
+    assert!(!says_what_it_is(&std::fs::read(pico.uf2.unwrap()).unwrap()));
 }

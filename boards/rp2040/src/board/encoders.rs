@@ -1,8 +1,8 @@
 //! The encoders: state machines count edges, 12.5 million per second each. Four are in PIO 0, the fifth is in PIO 1.
 
+use crate::gains::SENSORS;
 use hal::pac::pio0::RegisterBlock;
 use hal::pac::{PIO0, PIO1};
-use upright::gains::SENSORS;
 
 use super::pins::{ENCODERS, GIVES_PULSES};
 use super::state_machine::{Course, load, run, start};

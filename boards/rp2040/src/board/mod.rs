@@ -19,6 +19,7 @@ mod stop;
 mod supply;
 mod usb;
 
+use crate::gains::SENSORS;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, SYST};
 use hal::clocks::init_clocks_and_plls;
@@ -26,8 +27,8 @@ use hal::fugit::MicrosDurationU32;
 use hal::pac::{Interrupt, Peripherals};
 use hal::watchdog::Watchdog;
 use upright::board::{Board, Contacts, Inputs, Output};
+pub(crate) use upright::boards::rp::TICK_US;
 use upright::control::encoder::CounterWidth;
-use upright::gains::SENSORS;
 use upright::protocol::message::Start;
 
 use crate::CYCLES_PER_TICK;
@@ -39,9 +40,6 @@ use steps::Steps;
 use stop::stop;
 use supply::Supply;
 pub(crate) use usb::{UsbLine as SerialLine, UsbMemory};
-
-/// Shortest and longest tick (µs): a shorter one leaves no time for a controller, and SysTick has 24 bits.
-pub(crate) const TICK_US: [u32; 2] = [500, 100_000];
 
 /// Crystal of both boards (Hz).
 const CRYSTAL_HZ: u32 = 12_000_000;

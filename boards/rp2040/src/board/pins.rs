@@ -1,15 +1,16 @@
 //! Pins: numbers, pulls and functions. docs/pico.md shows the wiring.
 
 use hal::pac::{IO_BANK0, PADS_BANK0, RESETS, SIO};
-use upright::gains::TABLE;
+use upright::boards::rp;
 
 use super::chip::BLOCKS;
+use crate::gains::TABLE;
 
 /// Whether the drive of the gain table takes pulses.
 pub(super) const GIVES_PULSES: bool = TABLE.drive.pulses().is_some();
 
 /// Phase B of each encoder, from the cart's on; phase A is the next pin.
-pub(super) const ENCODERS: [usize; 5] = [0, 2, 4, 6, 8];
+pub(super) const ENCODERS: [usize; rp::ENCODERS] = [0, 2, 4, 6, 8];
 /// PWM: output A of slice 5. Step pulses for a drive that takes them.
 pub(super) const PWM: usize = 10;
 pub(super) const STEP: usize = PWM;

@@ -32,7 +32,7 @@ const REST: u32 = 8;
 /// The first state machine: a drive that takes pulses has no encoder at the cart.
 const NUMBER: usize = 0;
 /// Most pulses in a tick.
-const MOST: u32 = 1 << 12;
+const MOST: u32 = upright::boards::rp::PULSES;
 
 /// Divider of the clock: with it, half a tick fits into 19 bits.
 const DIVIDER: u32 = CYCLES_PER_TICK / (2 << 19) + 1;

@@ -3,6 +3,7 @@
 use hal::clocks::UsbClock;
 use hal::pac::RESETS;
 use hal::usb::UsbBus;
+use upright::heapless::Deque;
 use upright::protocol::serial_link::MAX_MESSAGE;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
@@ -35,8 +36,8 @@ pub(super) fn bus(clock: UsbClock, resets: &mut RESETS) -> UsbBusAllocator<UsbBu
 pub(crate) struct UsbLine {
     device: UsbDevice<'static, UsbBus>,
     port: SerialPort<'static, UsbBus>,
-    received: heapless::Deque<u8, 128>,
-    sent: heapless::Deque<u8, MAX_MESSAGE>,
+    received: Deque<u8, 128>,
+    sent: Deque<u8, MAX_MESSAGE>,
 }
 
 impl UsbLine {
@@ -52,7 +53,7 @@ impl UsbLine {
             .ok()?
             .device_class(USB_CLASS_CDC)
             .build();
-        Some(Self { device, port, received: heapless::Deque::new(), sent: heapless::Deque::new() })
+        Some(Self { device, port, received: Deque::new(), sent: Deque::new() })
     }
 
     /// Moves bytes in both directions.

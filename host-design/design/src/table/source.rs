@@ -10,8 +10,8 @@ use super::contents::{Field, TableNode, TableNumber};
 use super::values::TableValues;
 use crate::rig::{PlantDescription, Rig};
 
-/// The source of a `gains.rs` for `table`, designed from `rig`. It compiles in any crate that depends on `upright`, as a
-/// module or included in one: so it begins with comments that are no documentation.
+/// The source of a `gains.rs` for `table`, designed from `rig`. It compiles in any crate that depends on `upright`, as
+/// a module or included in one: therefore it begins with plain comments.
 pub fn gains_source(rig: &Rig, table: &TableValues) -> String {
     let mut out = String::new();
     // Writing into a String cannot fail.

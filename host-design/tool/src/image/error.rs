@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
+use upright::boards::{BoardRow, DEFAULT_BOARD, f4};
 use upright_closed_loop::conversation::words::joint;
 use upright_design::table::WriteError;
 
-use super::board::BoardName;
 use super::elf::ElfError;
-use super::pico_limits::PicoError;
 use crate::project::NoCheckout;
 
 /// The target that images are compiled for: Cortex-M4 with single-precision floating point.
@@ -20,6 +19,9 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 )]
 pub struct NoCompiler(pub(super) String);
 
+/// Largest share of a period that a tick of a Pico may take (%).
+pub(super) const MOST_PERCENT: f64 = 75.0;
+
 /// Why an image could not be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
@@ -27,10 +29,10 @@ pub enum BuildError {
     #[error(transparent)]
     NoCompiler(#[from] NoCompiler),
     /// The rig has more encoders than the board has timers for.
-    #[error("{board} counts {} encoders, and this rig has {needed}: use another board (docs/board.md)", board.encoders())]
+    #[error("{board} counts {} encoders, and this rig has {needed}: use another board (`upright firmware boards`)", board.encoders())]
     Encoders {
         /// Which board.
-        board: BoardName,
+        board: &'static BoardRow,
         /// Number of the rig's sensors.
         needed: usize,
     },
@@ -38,11 +40,11 @@ pub enum BuildError {
     #[error(
         "{board} reads absolute sensors of {} bits, AS5047D or AS5047P, and the {} has another sensor_bits: use \
          such a sensor, or write a board that reads it (docs/own-board.md)",
-        BoardName::ANGLE_BITS, joint(*sensor as u8)
+        f4::ANGLE_BITS, joint(*sensor as u8)
     )]
     AngleBits {
         /// Which board.
-        board: BoardName,
+        board: &'static BoardRow,
         /// Number of the first such sensor (0: cart, 1: first link).
         sensor: usize,
     },
@@ -50,18 +52,18 @@ pub enum BuildError {
     #[error(
         "{board} reads one potentiometer, with {} bits, at link 1, and link {link} has another: use a sensor of another \
          kind there, set its sensor_bits, or write a board that reads it (docs/own-board.md)",
-        BoardName::WIPER_BITS
+        f4::WIPER_BITS
     )]
     Potentiometer {
         /// Which board.
-        board: BoardName,
+        board: &'static BoardRow,
         /// The first such link, from 1.
         link: usize,
     },
     /// An absolute sensor, and the board reads encoders alone.
     #[error(
         "this board reads encoders alone, and the {} has an absolute sensor (sensor_bits): use another board \
-         (docs/board.md), or write one that reads it (docs/own-board.md)",
+         (`upright firmware boards`), or write one that reads it (docs/own-board.md)",
         joint(*sensor as u8)
     )]
     AbsoluteSensor {
@@ -70,12 +72,12 @@ pub enum BuildError {
     },
     /// The board cannot make the rig's tick.
     #[error(
-        "{board} makes ticks of {} to {} ms, and this rig's is {} ms: change tick.period_s (docs/board.md)",
-        rounded_ms(board.tick_s()[0]), rounded_ms(board.tick_s()[1]), rounded_ms(*tick_s)
+        "{board} makes ticks of {} to {} ms, and this rig's is {} ms: change tick.period_s, or use another board",
+        f64::from(board.tick_us()[0]) / 1e3, f64::from(board.tick_us()[1]) / 1e3, rounded_ms(*tick_s)
     )]
     Tick {
         /// Which board.
-        board: BoardName,
+        board: &'static BoardRow,
         /// The rig's tick (s).
         tick_s: f64,
     },
@@ -83,19 +85,48 @@ pub enum BuildError {
     #[error(
         "{board} gives {most:.0} step pulses in a second at most, {} of them in a tick, and the drive of this rig may \
          take {rate:.0}: lower actuator.step_rate_limit_hz",
-        BoardName::PULSES
+        board.pulses()
     )]
     Pulses {
         /// Which board.
-        board: BoardName,
+        board: &'static BoardRow,
         /// Most pulses in a second, at the rig's tick.
         most: f64,
         /// Pulses of this rig's drive in a second, at most.
         rate: f64,
     },
-    /// A Pico or Pico 2 cannot run the rig.
-    #[error(transparent)]
-    Pico(#[from] PicoError),
+    /// A tick that takes too long.
+    #[error(
+        "a tick {what} takes up to {cycles} cycles on a pico, {:.2} ms at {:.0} MHz: {:.0} % of this rig's {} ms, and \
+         {MOST_PERCENT} % is the most: {remedy}",
+        f64::from(*cycles) / clock_hz * 1e3, clock_hz / 1e6, f64::from(*cycles) / clock_hz / tick_s * 1e2, tick_s * 1e3
+    )]
+    Cycles {
+        /// What the firmware does in it.
+        what: &'static str,
+        /// Cycles of the longest tick.
+        cycles: u32,
+        /// The processor's clock (Hz).
+        clock_hz: f64,
+        /// The rig's tick (s).
+        tick_s: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The virtual board does not stand for this board.
+    #[error(
+        "the virtual board does not stand for a {board}, but for boards such as {DEFAULT_BOARD}: use one of them"
+    )]
+    NotVirtual {
+        /// Which board.
+        board: &'static BoardRow,
+    },
+    /// `src/gains.rs` is not a gain table.
+    #[error("{}: not a gain table; write it with `upright design RIG`", path.display())]
+    NoGains {
+        /// Its path.
+        path: PathBuf,
+    },
     /// The image cannot be read.
     #[error(transparent)]
     Elf(#[from] ElfError),

@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::checksum::file_hash;
 
-/// Files at the root of the repository that decide what is compiled, beside the sources.
+/// Files in the folders of a crate and of the repository that decide what is compiled, beside the sources.
 const SETTINGS: [&str; 4] = ["Cargo.toml", "Cargo.lock", "memory.x", ".cargo/config.toml"];
 
 /// Environment variables, by the beginning of their names, that change what cargo compiles.
@@ -21,7 +21,7 @@ pub(super) fn is_current(image: &Path, cargo: &Command, version: &str) -> bool {
 }
 
 /// Notes what `image` was made from by the `cargo` that was started at `begin`: the files that the compiler lists in
-/// `dependencies`, and the settings of the repository at `root`. Nothing is noted, so that the next build compiles
+/// `dependencies`, and the settings in `folders`. Nothing is noted, so that the next build compiles
 /// again, if a file has changed since `begin`, or no source is listed.
 pub(super) fn keep(
     image: &Path,
@@ -29,13 +29,14 @@ pub(super) fn keep(
     version: &str,
     begin: SystemTime,
     dependencies: &Path,
-    root: &Path,
+    folders: &[&Path],
 ) -> std::io::Result<()> {
     let mut files = sources(&std::fs::read_to_string(dependencies)?);
     if files.is_empty() {
         return Ok(());
     }
-    files.extend(SETTINGS.iter().map(|name| root.join(name)).filter(|path| path.exists()));
+    let settings = folders.iter().flat_map(|folder| SETTINGS.map(|name| folder.join(name)));
+    files.extend(settings.filter(|path| path.exists()));
     for file in &files {
         if std::fs::metadata(file)?.modified()? >= begin {
             return Ok(());
@@ -118,7 +119,7 @@ mod tests {
 
         fn keep(&self, cargo: &Command) {
             let (image, list) = (self.file("image.elf"), self.file("image.d"));
-            keep(&image, cargo, VERSION, self.begin, &list, self.path.path()).unwrap();
+            keep(&image, cargo, VERSION, self.begin, &list, &[self.path.path()]).unwrap();
         }
 
         fn is_current(&self, cargo: &Command) -> bool {

@@ -1,5 +1,6 @@
 //! Absolute sensors on the virtual board: the flashed image reads them over their bus, and has the bits of the host.
 
+use upright::boards::{DEFAULT_BOARD, named};
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
 use upright::table::Law;
@@ -10,7 +11,7 @@ use upright_design::rig::{LinkEncoder, Rig};
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_plan::{Stored, hangs, refined, up_and_down, with_motions};
-use upright_tool::image::{BoardName, build_for};
+use upright_tool::image::build_for;
 use upright_tool::in_the_loop::{Event, VirtualBoard, measure, run_compared};
 use upright_trust::verify::at_rest_disturbed;
 
@@ -45,7 +46,7 @@ fn potentiometer(noise_rad: f64) -> (Rig, TableValues) {
 }
 
 fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
-    let elf = built_for(BoardName::WeactF405, rig, table)?;
+    let elf = built_for(DEFAULT_BOARD, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
@@ -241,15 +242,15 @@ fn an_image_is_refused_for_a_board_or_a_sensor_that_do_not_fit() {
         let (rig, table) = absolute("single-quanser-ip02", bits, 1e-3);
         build_for(board, &rig, &table).unwrap_err().to_string()
     };
-    let bits = refused(BoardName::WeactF405, 12);
+    let bits = refused(DEFAULT_BOARD, 12);
     assert!(bits.contains("link 1") && bits.contains("14 bits") && bits.contains("own-board.md"), "{bits}");
     let (mut rig, _) = potentiometer(1e-3);
     let encoder =
         LinkEncoder::Absolute { bits: 14, travel_rad: Some(5.934), zero_counts: 10_400, noise_rad: 1e-3 };
     rig.chain_mut().unwrap().links[0].encoder = Some(encoder);
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-    let of_14 = build_for(BoardName::WeactF405, &rig, &table).unwrap_err().to_string();
+    let of_14 = build_for(DEFAULT_BOARD, &rig, &table).unwrap_err().to_string();
     assert!(of_14.contains("one potentiometer, with 12 bits, at link 1"), "{of_14}");
-    let feather = refused(BoardName::FeatherF405, 14);
+    let feather = refused(named("feather-f405").unwrap(), 14);
     assert!(feather.contains("link 1") && feather.contains("another board"), "{feather}");
 }

@@ -1,7 +1,8 @@
 //! How the flashed image reacts to hardware that is not as it should be, on the virtual board.
 
+use crate::gains::{TABLE, TICK_S};
 use upright::board::Contacts;
-use upright::gains::{TABLE, TICK_S};
+use upright::boards::{DEFAULT_BOARD, named};
 use upright::protocol::message::{Answer, CrashRecord, Info, Reply, Request, Reset};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
@@ -9,7 +10,7 @@ use upright::supervision::supervisor::State;
 use upright_board::{
     Chip, Conditions, Crystal, ExternalLevel, Image, Input, Rules, SimulatedBoard, pin, seconds,
 };
-use upright_tool::image::{BoardName, flash_checksum};
+use upright_tool::image::{conditions, flash_checksum};
 use upright_tool::monitor::Monitor;
 
 use crate::equipment::built;
@@ -244,10 +245,10 @@ fn a_pin_shows_the_tick() {
 #[test]
 fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
     for (board, led, is_low) in [
-        (BoardName::WeactF405, pin('B', 2), false),
-        (BoardName::OlimexH405, pin('C', 12), true),
-        (BoardName::DiscoveryF407, pin('D', 12), false),
-        (BoardName::NucleoF446, pin('A', 5), false),
+        (DEFAULT_BOARD, pin('B', 2), false),
+        (named("olimex-h405").unwrap(), pin('C', 12), true),
+        (named("discovery-f407").unwrap(), pin('D', 12), false),
+        (named("nucleo-f446").unwrap(), pin('A', 5), false),
     ] {
         let Some(elf) = built(board) else { return };
         let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
@@ -256,9 +257,9 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
             run.run(0.5);
             (run.last(), run.board.output(led) != is_low, run.board.core_hz())
         };
-        let own = board.conditions(1);
+        let own = conditions(board, 1).unwrap();
         assert_eq!(started(&own), ((State::Disarmed, None), true, 168_000_000), "{board}");
-        if board == BoardName::NucleoF446 {
+        if board.name == "nucleo-f446" {
             // MB1136 C-01 with a crystal fitted, and as it comes: without any clock.
             let crystal = Crystal { is_clock_input: false, ..own.crystal };
             let fitted = Conditions { crystal, ..own };
@@ -266,7 +267,7 @@ fn every_board_starts_with_its_own_chip_clock_and_led_and_with_no_other() {
             let bare = Conditions { crystal: Crystal { hz: 0, ..crystal }, ..own };
             assert_eq!(started(&bare), ((State::Fault, Some(Fault::Clock)), false, 16_000_000));
         }
-        if board == BoardName::DiscoveryF407 {
+        if board.name == "discovery-f407" {
             // It runs from 3.0 V at most; the first revision of its chip has another identity.
             for other in [Conditions { chip_v: 2.8, ..own }, Conditions { chip: Chip::F407RevisionA, ..own }]
             {

@@ -1,13 +1,13 @@
 //! A short campaign: every defect is found in time, there are no false alarms, and without detection the defects are
 //! missed.
 
+use upright::boards::DEFAULT_BOARD;
 use upright_board::{Conditions, Image};
 use upright_design::design::design;
 use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::campaign::{Campaign, Defect, During, Setup, Trial, campaign, feed, kinds, one};
-use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::RunPlace;
 
 use crate::equipment::built;
@@ -153,7 +153,7 @@ fn every_defect_of_a_jog_is_found_and_nothing_else() {
 #[test]
 fn on_the_virtual_board_a_jog_ends_with_its_defects_and_does_not_without_the_guards() {
     let (rig, table) = rig_and_table("quadruple-paper");
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let place = RunPlace::Board { image: &image, conditions: Conditions::f405(1) };
     let setup = Setup { place, during: During::Jog, ..on_host(rig, table) };

@@ -185,7 +185,7 @@ fn check_names_the_format_the_rig_and_the_tick_of_a_table_that_has_another() {
 fn a_table_of_an_older_format_does_not_compile_and_the_error_says_what_to_do() {
     let compiled = |table: &str| {
         let path = fixture(table);
-        let arguments = "check --quiet --offline --package upright --lib --features gains-from-env";
+        let arguments = "check --quiet --offline --package upright --lib --features image";
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(arguments.split(' '));
         output(cargo.current_dir(upright_test_support::repository()).env("UPRIGHT_GAINS", path))

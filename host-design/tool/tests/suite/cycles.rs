@@ -1,11 +1,12 @@
 //! What a tick of the flashed image costs, on the virtual board.
 
+use upright::boards::DEFAULT_BOARD;
 use upright::table::Law;
 use upright_board::{Conditions, CoreTiming, Image, Rules, SimulatedBoard};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
-use upright_tool::image::{BoardName, compiler};
+use upright_tool::image::compiler;
 use upright_tool::in_the_loop::{Span, TickCycles, measure};
 
 use crate::equipment::built;
@@ -105,7 +106,7 @@ fn slower(image: &Image, turns: u8) -> Image {
 
 #[test]
 fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_not() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let measured = |image: &Image, timing| measured(&rig, &table, image, timing);
@@ -137,7 +138,7 @@ fn the_ticks_of_the_image_stay_within_their_limits_and_those_of_a_slower_one_do_
 /// docs/results/board.md says so.
 #[test]
 fn by_the_slow_model_the_image_misses_the_goals_of_task_and_controller_and_no_other() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let cycles = measured(&rig, &table, &image, CoreTiming::Slow);

@@ -4,13 +4,16 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use upright::boards::f4::{F4Board, HseSource};
+use upright::boards::wiring::{STANDARD, Signal, Wire};
+use upright::boards::{BOARDS, BoardRow, Family, named};
 use upright::supervision::fault::Fault;
 use upright::supervision::inhibits::Inhibits;
 use upright_design::export::{CALLING, header_faults};
 use upright_test_support::limits::output;
 use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
-use upright_tool::image::{BoardName, PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
+use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
 use upright_tool::monitor::{MonitorAction, action, request};
 
 use crate::documents::{read, root};
@@ -321,24 +324,98 @@ fn the_page_about_the_pico_holds_the_ticks_of_the_source() {
     hold("docs/results/pico.md", "ticks", &ticks_of_a_pico());
 }
 
-/// Name, number of links and ticks of each board.
-fn known_boards() -> Vec<[String; 3]> {
-    let known = |board: BoardName| {
-        let [shortest_ms, longest_ms] = board.tick_s().map(|tick_s| (tick_s * 1e6).round() / 1e3);
-        let links = board.encoders() - 1;
-        [format!("`{board}`"), links.to_string(), format!("{shortest_ms} to {longest_ms} ms")]
-    };
-    BoardName::ALL.into_iter().map(known).collect()
+fn connected_to(signal: Signal, has_bus: bool) -> String {
+    let at = |what: &str, other: &str| if has_bus { format!("{what}; or {other}") } else { what.to_owned() };
+    match signal {
+        Signal::Encoder(0, b'A') => at("cart encoder, A", "MISO"),
+        Signal::Encoder(0, channel) => format!("cart encoder, {}", char::from(channel)),
+        Signal::Encoder(link, b'A') => at(&format!("link {link} encoder, A"), "MISO"),
+        Signal::Encoder(1, _) => at("link 1 encoder, B", "wiper"),
+        Signal::Encoder(link, channel) => format!("link {link} encoder, {}", char::from(channel)),
+        Signal::Pwm => "power stage, PWM: high drives; or STEP".to_owned(),
+        Signal::Direction => "power stage, direction: high pushes along +x".to_owned(),
+        Signal::Enable => "power stage, enable: high; 10 kΩ to ground".to_owned(),
+        Signal::DriverFault => "power stage, fault: low; open drain".to_owned(),
+        Signal::EmergencyStop => "emergency stop: opens when pressed".to_owned(),
+        Signal::LimitLow => "limit switch, low end: opens when pressed".to_owned(),
+        Signal::LimitHigh => "limit switch, high end: opens when pressed".to_owned(),
+        Signal::Supply => "supply voltage through 22 kΩ; 1 kΩ to ground".to_owned(),
+        Signal::AngleSelect => "absolute sensors, select (CSn)".to_owned(),
+        Signal::AngleClock => "absolute sensors, clock (CLK)".to_owned(),
+        Signal::AngleCommand => "absolute sensors, command (MOSI)".to_owned(),
+        Signal::Transmit => "serial line to the host".to_owned(),
+        Signal::Receive => "serial line from the host".to_owned(),
+        Signal::Tick => "oscilloscope: high while a tick runs".to_owned(),
+        Signal::StatusLed => "status LED".to_owned(),
+    }
 }
 
-/// A test of the image compares this table with the image.
-#[test]
-fn the_tool_knows_the_boards_of_the_page() {
-    let documented = |page: &str| -> Vec<[String; 3]> {
-        let rows = rows(between(page, "boards").unwrap());
-        rows.iter().map(|cells| [cells[0], cells[3], cells[4]].map(str::to_owned)).collect()
+fn pin(wire: &Wire) -> String {
+    format!("P{}{}", char::from(wire.port), wire.pin)
+}
+
+fn wiring(wires: &[Wire]) -> String {
+    let has_bus = wires.iter().any(|wire| wire.signal == Signal::AngleSelect);
+    let head = "| pin | function | connected to | inside |\n|---|---|---|---|\n".to_owned();
+    wires.iter().fold(head, |table, wire| {
+        let (pull_up, what) = (if wire.pull_up { "pull-up" } else { "" }, connected_to(wire.signal, has_bus));
+        table + &format!("| {} | {} | {what} | {pull_up} |\n", pin(wire), wire.function)
+    })
+}
+
+/// The boards whose wiring is on the page.
+fn f4_boards() -> impl Iterator<Item = (&'static BoardRow, &'static F4Board)> {
+    BOARDS.iter().filter_map(|row| match &row.family {
+        Family::F4(board) => Some((row, board)),
+        Family::Rp(_) => None,
+    })
+}
+
+fn boards() -> String {
+    let head = "| `--board` | board | chip | links | tick | clock at HSE | status LED |\n|---|---|---|---|---|---|---|\n";
+    let row = |(row, board): (&BoardRow, &F4Board)| {
+        let sources = board.sources.iter().map(|source| match source {
+            HseSource::Crystal => "crystal",
+            HseSource::Clock => "clock input",
+        });
+        let led = if board.status_led_is_low { "low" } else { "high" };
+        let [shortest_ms, longest_ms] = row.tick_us().map(|us| f64::from(us) / 1e3);
+        format!(
+            "| `{row}` | {} | {} | {} | {shortest_ms} to {longest_ms} ms | {} MHz {} | {}, on while {led} |\n",
+            row.product,
+            row.chip(),
+            row.encoders() - 1,
+            board.crystal_hz / 1_000_000,
+            sources.collect::<Vec<_>>().join(", else "),
+            pin(&board.status_led),
+        )
     };
-    let page = read("docs/board.md");
-    assert_eq!(known_boards(), documented(&page));
-    assert_ne!(known_boards(), documented(&page.replace("| 0.12 to 33 ms |", "| 0.1 to 33 ms |")));
+    head.to_owned() + &f4_boards().map(row).collect::<String>()
+}
+
+/// What is special about each board.
+fn notes() -> String {
+    let head = "| `--board` | supply of the chip | special |\n|---|---|---|\n".to_owned();
+    f4_boards().fold(head, |table, (row, board)| {
+        table + &format!("| `{row}` | {} V | {} |\n", board.reference_v, board.special)
+    })
+}
+
+#[test]
+fn the_page_about_the_board_shows_the_boards_and_their_wiring() {
+    hold("docs/board.md", "boards", &boards());
+    hold("docs/board.md", "notes", &notes());
+    hold("docs/board.md", "wiring", &wiring(&STANDARD));
+    let feather = named("feather-f405").unwrap();
+    for (row, board) in f4_boards() {
+        if row == feather {
+            hold("docs/board.md", "wiring of the Feather", &wiring(board.wiring));
+        } else {
+            assert_eq!(board.wiring, STANDARD, "{row} has a wiring that the page does not show");
+        }
+    }
+    // Negative control: another pin.
+    let mut other = STANDARD;
+    other[0].pin += 1;
+    assert_ne!(wiring(&other), wiring(&STANDARD));
 }

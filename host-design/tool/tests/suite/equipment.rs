@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
+use upright::boards::BoardRow;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_tool::image::{BoardName, BuildError, build, build_for};
+use upright_tool::image::{BuildError, build, build_for};
 
 pub(crate) use upright_test_support::equipment::{is_required, not_exercised};
 
@@ -15,11 +16,11 @@ pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Optio
 }
 
 /// The image with the committed gain table.
-pub(crate) fn built(board: BoardName) -> Option<PathBuf> {
-    if_possible(build(board), "an image")
+pub(crate) fn built(board: &'static BoardRow) -> Option<PathBuf> {
+    if_possible(build(board), "an image").map(|image| image.elf)
 }
 
 /// The image with this table.
-pub(crate) fn built_for(board: BoardName, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
-    if_possible(build_for(board, rig, table), "an image")
+pub(crate) fn built_for(board: &'static BoardRow, rig: &Rig, table: &TableValues) -> Option<PathBuf> {
+    if_possible(build_for(board, rig, table), "an image").map(|image| image.elf)
 }

@@ -7,6 +7,7 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use upright::board::{Contacts, Output};
+use upright::boards::DEFAULT_BOARD;
 use upright::control::actuator::Drive;
 use upright::supervision::jog::MotorSign;
 use upright::supervision::sign_check::Signs;
@@ -15,7 +16,7 @@ use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_closed_loop::harness::{Pins, Session};
 use upright_design::simulate::{Bench, Scenario};
-use upright_tool::image::{BoardName, flash_checksum};
+use upright_tool::image::flash_checksum;
 use upright_tool::in_the_loop::VirtualBoard;
 use upright_tool::monitor::{Monitor, action, view};
 
@@ -246,7 +247,7 @@ fn first_balance(person: &mut Person<'_>) {
 
 #[test]
 fn the_guide_can_be_followed_step_by_step() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();

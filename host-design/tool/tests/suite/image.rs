@@ -8,9 +8,10 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use upright::boards::DEFAULT_BOARD;
 use upright_test_support::limits::{joined, output, received};
 use upright_tool::image::{
-    BoardName, BuildError, Compiler, LinkedImage, PROFILE, StackError, TARGET, compiler, forbidden_functions,
+    BuildError, Compiler, LinkedImage, PROFILE, StackError, TARGET, compiler, forbidden_functions,
     forbidden_in_handlers, size, stack_bound,
 };
 
@@ -19,7 +20,7 @@ use crate::equipment::{built, if_possible};
 /// Path of the flashed image; `None` without a compiler for it.
 fn flashed() -> Option<&'static Path> {
     static PATH: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PATH.get_or_init(|| built(BoardName::WeactF405)).as_deref()
+    PATH.get_or_init(|| built(DEFAULT_BOARD)).as_deref()
 }
 
 /// Path of an image that must not be flashed; `None` without a compiler for it.
@@ -39,7 +40,7 @@ fn built_unfit() -> Result<PathBuf, BuildError> {
         "--bin",
         "unfit-image",
         "--features",
-        "weact-f405",
+        "stm32f405",
     ]);
     let compiled = output(cargo.args(["--profile", PROFILE, "--target", TARGET]));
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
@@ -62,12 +63,12 @@ fn an_image_waits_for_the_one_that_is_being_compiled() {
     let Some(path) = flashed() else { return };
     // Several times as long as for an image that does not wait and has been compiled before.
     let begin = Instant::now();
-    built(BoardName::WeactF405);
+    built(DEFAULT_BOARD);
     let patience = (4 * begin.elapsed()).min(Duration::from_secs(3));
     let other = File::create(path.with_file_name("compiling")).unwrap();
     other.lock().unwrap();
     let (done, is_done) = mpsc::channel();
-    let builder = std::thread::spawn(move || done.send(built(BoardName::WeactF405)).unwrap());
+    let builder = std::thread::spawn(move || done.send(built(DEFAULT_BOARD)).unwrap());
     assert_eq!(is_done.recv_timeout(patience), Err(RecvTimeoutError::Timeout));
     other.unlock().unwrap();
     assert_eq!(received(&is_done, "the image").as_deref(), Some(path));

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use upright::board::{Contacts, Output};
+use upright::boards::DEFAULT_BOARD;
 use upright::control::actuator::Drive;
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
@@ -15,7 +16,7 @@ use upright_board::Image;
 use upright_closed_loop::client::AnyTelemetry;
 use upright_closed_loop::harness::{HarnessError, Target, World, with_firmware};
 use upright_design::simulate::Scenario;
-use upright_tool::image::BoardName;
+use upright_tool::image::conditions;
 use upright_tool::in_the_loop::{Compared, VirtualBoard};
 
 use crate::equipment::built;
@@ -214,10 +215,10 @@ fn on_the_host_the_motor_moves_the_cart_a_little_while_a_key_is_held() {
 
 #[test]
 fn the_flashed_image_does_it_with_the_bits_of_the_host() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(Path::new(&elf)).unwrap()).unwrap();
     let (_, table) = rig_and_table("quadruple-paper");
-    let mut board = VirtualBoard::start(&image, &BoardName::WeactF405.conditions(1), table).unwrap();
+    let mut board = VirtualBoard::start(&image, &conditions(DEFAULT_BOARD, 1).unwrap(), table).unwrap();
     with_firmware(table, |host| {
         let mut compared = Compared::new(&mut board, host);
         bench_of(&mut compared, whole_check).unwrap();

@@ -1,12 +1,12 @@
 //! A force and readings that are late, on the virtual board: the flashed image makes up for them with the bits of the
 //! host.
 
+use upright::boards::DEFAULT_BOARD;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::design::design;
 use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::{VirtualBoard, run_compared};
 
 use crate::equipment::built_for;
@@ -23,7 +23,7 @@ fn the_image_makes_up_for_a_late_force_and_old_readings_with_the_bits_of_the_hos
     (both.tick.delay_ticks, both.swing_up) = (1, None);
     for rig in [force, readings, both] {
         let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
-        let Some(elf) = built_for(BoardName::WeactF405, &rig, &table) else { return };
+        let Some(elf) = built_for(DEFAULT_BOARD, &rig, &table) else { return };
         let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
         let scenario = Scenario { duration_s: 2.0, step_m: 0.02, ..Scenario::at_rest(&rig, Law::Lqr) };
         let run = |table_of_host: &TableValues| {

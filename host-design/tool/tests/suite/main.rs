@@ -15,6 +15,9 @@ mod documents;
 mod equipment;
 mod first_power_up;
 mod first_words;
+#[path = "../../../../src/gains.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a table of which not all is needed")]
+mod gains;
 mod identify_command;
 mod image;
 mod import_command;

@@ -2,13 +2,13 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use upright::boards::DEFAULT_BOARD;
 use upright::flash_image::REFERENCE;
 use upright::protocol::message::{Answer, Reply, Request};
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright_board::{Conditions, Image, Input};
 use upright_closed_loop::conversation::words;
-use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::RULES;
 
 use crate::equipment::built_for;
@@ -72,7 +72,7 @@ fn the_record_of_the_crash_names_the_word_that_has_changed() {
 /// The image with stored motions, which are half of it.
 fn image_with_motions() -> Option<Image> {
     let (rig, table) = rig_and_table_with_motions("quadruple-paper");
-    let elf = built_for(BoardName::WeactF405, rig, table)?;
+    let elf = built_for(DEFAULT_BOARD, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 

@@ -1,13 +1,13 @@
 //! The flashed image on the virtual board, switched on and listened to.
 
+use crate::gains::{SENSORS, STATES};
+use upright::boards::DEFAULT_BOARD;
 use upright::flash_image::{REFERENCE, WordSums};
-use upright::gains::{SENSORS, STATES};
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Command, Message, Reply, Request, Telemetry};
 use upright::supervision::fault::Fault;
 use upright::supervision::supervisor::State;
 use upright_board::{Conditions, ExternalLevel, Image, Input, Rules, SimulatedBoard, seconds};
-use upright_tool::image::BoardName;
 
 use crate::equipment::built;
 
@@ -15,7 +15,7 @@ pub(crate) const BAUD: u32 = 460_800;
 
 /// The image; none without a compiler.
 pub(crate) fn image() -> Option<Image> {
-    let elf = built(BoardName::WeactF405)?;
+    let elf = built(DEFAULT_BOARD)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 

@@ -1,10 +1,10 @@
 //! Errors of the serial line of the flashed image, on the virtual board: afterwards it hears commands again.
 
-use upright::gains::{SENSORS, STATES};
+use crate::gains::{SENSORS, STATES};
+use upright::boards::DEFAULT_BOARD;
 use upright::protocol::frame::{self, Receiver};
 use upright::protocol::message::{Command, Message, Request};
 use upright_board::{Conditions, Image, Input, Rules, SimulatedBoard, seconds};
-use upright_tool::image::BoardName;
 
 use crate::equipment::built;
 
@@ -36,7 +36,7 @@ fn answered(image: &Image, disturbance: Option<Input>) -> Vec<u64> {
 
 #[test]
 fn an_overrun_or_a_dma_error_does_not_make_the_board_deaf() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     for disturbance in [None, Some(Input::Overrun), Some(Input::ReceiveError)] {
         assert_eq!(answered(&image, disturbance), [1, 2, 3], "{disturbance:?}");

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use upright::board::Output;
+use upright::boards::DEFAULT_BOARD;
 use upright::control::actuator::Drive;
 use upright::protocol::message::Request;
 use upright::protocol::tick_log::OFF;
@@ -25,7 +26,7 @@ use upright_identify::{
     Feed, LineError, Log, OverLine, ParameterKind, Settings, ShakingHost, checked_and_hanging, identify,
     shake_with,
 };
-use upright_tool::image::BoardName;
+use upright_tool::image::conditions;
 use upright_tool::in_the_loop::{Compared, RunPlace, VirtualBoard, run_shaken};
 
 use crate::equipment::built_for;
@@ -98,9 +99,9 @@ fn the_log_of_the_firmware_gives_the_parameters_of_the_machine() {
 fn the_flashed_image_is_shaken_with_the_bits_of_the_host() {
     // With its motions, so that this test and others share one image.
     let (machine, table) = rig_and_table_with_motions("single-quanser-ip02").clone();
-    let Some(elf) = built_for(BoardName::WeactF405, &machine, &table) else { return };
+    let Some(elf) = built_for(DEFAULT_BOARD, &machine, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
-    let mut board = VirtualBoard::start(&image, &BoardName::WeactF405.conditions(1), &table).unwrap();
+    let mut board = VirtualBoard::start(&image, &conditions(DEFAULT_BOARD, 1).unwrap(), &table).unwrap();
     let log = with_firmware(&table, |host| {
         shake_with(&machine, &table, &mut Compared::new(&mut board, host), 3.0, 1).unwrap()
     });

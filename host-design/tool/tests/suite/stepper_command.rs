@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use upright_tool::image::BoardName;
+use upright::boards::DEFAULT_BOARD;
 
 use crate::command::{status, stderr, stdout, upright};
 use crate::equipment::built_for;
@@ -74,7 +74,7 @@ fn check_design_simulate_and_export_serve_a_stepper() {
 #[test]
 fn commands_with_an_image_serve_a_stepper() {
     let (rig, table) = rig_and_table("single-stepper");
-    if built_for(BoardName::WeactF405, rig, table).is_none() {
+    if built_for(DEFAULT_BOARD, rig, table).is_none() {
         return;
     }
     let board = ["--target", "board"];

@@ -5,6 +5,7 @@ use core::f64::consts::PI;
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use upright::boards::DEFAULT_BOARD;
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::supervision::homing::Homing;
@@ -17,7 +18,7 @@ use upright_design::study::Study;
 use upright_design::table::TableValues;
 use upright_plan::{hangs, up_and_down};
 use upright_tool::campaign::{Class, Defect, During, Setup, campaign, kinds, one};
-use upright_tool::image::BoardName;
+use upright_tool::image::conditions;
 use upright_tool::in_the_loop::{Event, RunError, RunPlace, VirtualBoard, run_compared};
 
 use crate::equipment::built_for;
@@ -84,7 +85,7 @@ fn are_even(due: Time, tick: Time, pulses: &[Pulse]) -> bool {
 }
 
 fn image(rig: &Rig, table: &TableValues) -> Option<Image> {
-    let elf = built_for(BoardName::WeactF405, rig, table)?;
+    let elf = built_for(DEFAULT_BOARD, rig, table)?;
     Some(Image::from_elf(&std::fs::read(elf).unwrap()).unwrap())
 }
 
@@ -262,7 +263,7 @@ fn a_start_that_would_cut_the_pulses_before_is_refused() {
 fn defects_of_a_stepper_are_found_on_the_board_as_on_the_host() {
     let (rig, table) = rig_and_table("single-stepper");
     let Some(image) = image(rig, table) else { return };
-    let place = RunPlace::Board { image: &image, conditions: BoardName::WeactF405.conditions(1) };
+    let place = RunPlace::Board { image: &image, conditions: conditions(DEFAULT_BOARD, 1).unwrap() };
     let setup = Setup { rig, table, place, detection: true, guards: true, during: During::Balancing };
     let chosen = [
         Defect::StopBetweenTicks,

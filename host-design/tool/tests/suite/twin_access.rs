@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket, client};
+use upright::boards::DEFAULT_BOARD;
 use upright::table::Law;
 use upright_board::{Conditions, Image};
 use upright_design::simulate::{Scenario, Sensing};
 use upright_test_support::limits::{PATIENCE, SetAtEnd, until};
-use upright_tool::image::BoardName;
 use upright_tool::in_the_loop::RunPlace;
 use upright_tool::twin::{Server, SimulatedMachine};
 
@@ -231,7 +231,7 @@ fn the_motor_is_turned_off_when_the_page_in_command_is_closed_or_sleeps() {
 
 #[test]
 fn the_flashed_image_balances_behind_the_page_and_obeys_it() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, Law::Lqr) };

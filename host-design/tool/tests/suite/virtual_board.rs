@@ -3,7 +3,8 @@
 
 use std::sync::OnceLock;
 
-use upright::gains::RIG_HASH;
+use crate::gains::RIG_HASH;
+use upright::boards::{DEFAULT_BOARD, named};
 use upright::protocol::message::Request;
 use upright::supervision::fault::Fault;
 use upright::table::Law;
@@ -15,7 +16,7 @@ use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_plan::{hangs, up_and_down};
 use upright_tool::campaign::{Class, Defect, During, Setup, one};
-use upright_tool::image::{BoardName, build};
+use upright_tool::image::{build, conditions};
 use upright_tool::in_the_loop::{RunPlace, VirtualBoard, measure, run_compared};
 
 use crate::equipment::{built, built_for};
@@ -23,7 +24,7 @@ use crate::published::{rig_and_table, rig_and_table_with_motions};
 
 #[test]
 fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     assert_eq!(rig.hash(), RIG_HASH);
@@ -55,7 +56,7 @@ fn the_flashed_image_balances_from_power_up_with_the_bits_of_the_host() {
 #[test]
 fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
     let (rig, table) = rig_and_table_with_motions("quadruple-paper").clone();
-    let Some(elf) = built_for(BoardName::WeactF405, &rig, &table) else { return };
+    let Some(elf) = built_for(DEFAULT_BOARD, &rig, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let scenario = up_and_down(&rig, &table, 0.5).unwrap();
     let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
@@ -74,7 +75,7 @@ fn the_flashed_image_raises_and_lowers_the_links_with_the_bits_of_the_host() {
 /// Every tick restarts the PWM's timer for three ticks.
 #[test]
 fn restarts_of_the_pwm_fall_at_one_place_of_its_period_and_cut_no_pulse() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (rig, table) = rig_and_table("quadruple-paper").clone();
     let mut scenario = Scenario::at_rest(&rig, Law::Lqr);
@@ -109,7 +110,7 @@ fn cuts(pulses: &[Pulse]) -> usize {
 /// The supply of the chip is too low for the wait states that the image sets.
 #[test]
 fn a_stopped_run_names_address_and_source_line() {
-    let Some(elf) = built(BoardName::WeactF405) else { return };
+    let Some(elf) = built(DEFAULT_BOARD) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     let (_, table) = rig_and_table("quadruple-paper");
     let conditions = Conditions { chip_v: 2.5, ..Conditions::f405(1) };
@@ -130,7 +131,7 @@ fn motor_delay_and_integral_action_give_the_bits_of_the_host() {
     rig.integral = Some(Integral { position_weight: 100.0, setpoint_weight: 1.0 });
     let table = TableValues::of(&rig, &design(&rig).unwrap(), Gains::Sampled).unwrap();
     assert!(table.drive.supply_v().is_some() && table.sensors() == 2);
-    let Some(elf) = built_for(BoardName::WeactF405, &rig, &table) else { return };
+    let Some(elf) = built_for(DEFAULT_BOARD, &rig, &table) else { return };
     let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
     for law in Law::ALL {
         let scenario =
@@ -150,7 +151,7 @@ fn feather() -> Option<(Rig, TableValues, Image)> {
 
 fn built_for_the_feather() -> Option<(Rig, TableValues, Image)> {
     let (rig, table) = rig_and_table_with_motions("single-quanser-ip02").clone();
-    let elf = built_for(BoardName::FeatherF405, &rig, &table)?;
+    let elf = built_for(named("feather-f405").unwrap(), &rig, &table)?;
     Some((rig, table, Image::from_elf(&std::fs::read(elf).unwrap()).unwrap()))
 }
 
@@ -158,7 +159,7 @@ fn built_for_the_feather() -> Option<(Rig, TableValues, Image)> {
 #[test]
 fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chip_or_crystal() {
     let Some((rig, table, image)) = feather() else { return };
-    let own = BoardName::FeatherF405.conditions(1);
+    let own = conditions(named("feather-f405").unwrap(), 1).unwrap();
     let scenario = Scenario { duration_s: 1.0, step_m: 0.05, ..Scenario::at_rest(&rig, Law::Lqr) };
     let mut power_on = VirtualBoard::start(&image, &own, &table).unwrap();
     let (recording, [ticks, messages]) = run_compared(&rig, &table, &scenario, &mut power_on).unwrap();
@@ -185,7 +186,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
     assert_eq!(fault_of(&Conditions { crystal, ..own }), Some(Fault::Clock));
 
     // A rig with more encoders than the board counts.
-    let error = build(BoardName::FeatherF405).unwrap_err().to_string();
+    let error = build(named("feather-f405").unwrap()).unwrap_err().to_string();
     assert_eq!(
         error,
         "feather-f405 counts 2 encoders, and this rig has 5: use another board (docs/board.md)"
@@ -196,7 +197,8 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
 #[test]
 fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_not() {
     let Some((rig, table, image)) = feather() else { return };
-    let place = RunPlace::Board { image: &image, conditions: BoardName::FeatherF405.conditions(1) };
+    let place =
+        RunPlace::Board { image: &image, conditions: conditions(named("feather-f405").unwrap(), 1).unwrap() };
     let setup =
         Setup { rig: &rig, table: &table, place, detection: true, guards: true, during: During::Balancing };
     let surge = one(&setup, &[Defect::SupplySurge], 1, 0).unwrap();
@@ -211,7 +213,7 @@ fn a_supply_that_a_braking_motor_pumps_up_turns_the_motor_off_and_a_spike_does_n
 fn no_tick_of_raising_and_lowering_takes_longer_than_a_quarter_of_its_period() {
     let Some((rig, table, image)) = feather() else { return };
     let scenario = Scenario { duration_s: 0.2, ..Scenario::at_rest(&rig, Law::Lqr) };
-    let conditions = BoardName::FeatherF405.conditions(1);
+    let conditions = conditions(named("feather-f405").unwrap(), 1).unwrap();
     let cycles = measure(&rig, &table, &scenario, &image, &conditions).unwrap();
     assert_eq!((cycles.ended.as_deref(), cycles.check()), (None, Ok(())));
     let (balancing, moving) = (cycles.balancing.unwrap(), cycles.moving.unwrap());

@@ -8,13 +8,14 @@
 //! wire at 3.3 V is an error flag; a wire at 0 V is a sensor that says that it is not ready.
 
 use cortex_m::asm;
+use upright::boards::f4::ANGLE_BITS;
+use upright::boards::wiring::{Signal, Wire, wire_of};
 use upright::control::encoder::AbsoluteSensor;
 use upright::gains::SENSORS;
 
-use super::boards::BOARD;
+use super::chosen::BOARD;
 use super::pins;
-use super::sensors::{ANY_IS_ON_BUS, BITS, is_on_bus};
-use super::wiring::{Signal, Wire, wire_of};
+use super::sensors::{ANY_IS_ON_BUS, is_on_bus};
 
 /// In every answer: the sensor has found an error in a command. It stays until the errors are read.
 const ERROR_FLAG: u16 = 1 << 14;
@@ -61,7 +62,7 @@ pub(super) struct Angles {
 impl Angles {
     /// The sensors before [`set_up`](Self::set_up).
     pub(super) fn new() -> Self {
-        let sensors = [const { AbsoluteSensor::new(BITS) }; SENSORS];
+        let sensors = [const { AbsoluteSensor::new(ANGLE_BITS) }; SENSORS];
         Self { sensors, asked: READ_STATE }
     }
 
@@ -90,7 +91,7 @@ impl Angles {
             }
             let is_ready = state & (READY | OVERFLOW | MAGNET_LOW) == READY;
             if is_sound(angle) && (!was_state || is_sound(state) && is_ready) {
-                *count = sensor.count((angle & ((1 << BITS) - 1)).into());
+                *count = sensor.count((angle & ((1 << ANGLE_BITS) - 1)).into());
             } else {
                 bad |= 1 << number;
             }

@@ -11,10 +11,10 @@
 //! to report the fault. The voltage scaling for 168 MHz is the default after a reset (RM0090, 5.4.1; RM0390, 5.4.1).
 
 use crate::pac::{FLASH, RCC, TIM11};
+use upright::boards::f4::HseSource;
 use upright::protocol::message::Reset;
 
-use super::boards::BOARD;
-use super::boards::data::HseSource;
+use super::chosen::BOARD;
 use super::serial;
 
 /// Core clock (Hz).

@@ -1,9 +1,9 @@
 //! The record of a crash, which survives a reset.
 
 use core::mem::MaybeUninit;
+use upright::protocol::message::CrashRecord;
 
 use cortex_m::peripheral::SCB;
-use upright::protocol::message::CrashRecord;
 
 /// The last crash. It is not initialised at start-up, so it survives a reset.
 #[unsafe(link_section = ".uninit.CRASH")]

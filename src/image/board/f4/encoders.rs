@@ -1,13 +1,13 @@
 //! Incremental encoders, counted by timers.
 
 use crate::pac::{TIM2, TIM3, TIM4, TIM5, TIM8};
+use upright::boards::wiring::{Signal, encoders, wire_of};
 use upright::control::encoder::CounterWidth::{self, Bits16, Bits32};
 use upright::gains::SENSORS;
 
-use super::boards::BOARD;
+use super::chosen::BOARD;
 use super::motor::GIVES_PULSES;
 use super::sensors::is_absolute;
-use super::wiring::{Signal, encoders, wire_of};
 
 /// The timers in use, cart first, then the links from the lowest up.
 const TIMERS: [(*const u32, CounterWidth); SENSORS] = {

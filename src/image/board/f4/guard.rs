@@ -2,9 +2,9 @@
 
 use crate::pac::{DBGMCU, EXTI, PWR};
 use cortex_m::peripheral::MPU;
+use upright::boards::f4::F4Chip;
 
-use super::boards::BOARD;
-use super::boards::data::ChipFamily;
+use super::chosen::BOARD;
 
 /// Bit of the EXTI line to which the voltage detector is connected (RM0090, 12.2.5).
 const DETECTOR: u32 = 1 << 16;
@@ -18,8 +18,7 @@ const F2_OR_REVISION_A: u32 = 0x411;
 pub(super) fn chip_is_right(debug: &DBGMCU) -> bool {
     debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
     let identity = debug.idcode().read().bits() & 0xfff;
-    identity == BOARD.chip as u32
-        || matches!(BOARD.chip, ChipFamily::F405OrF407) && identity == F2_OR_REVISION_A
+    identity == BOARD.chip.identity() || !matches!(BOARD.chip, F4Chip::F446) && identity == F2_OR_REVISION_A
 }
 
 /// Makes every access to the 64 KiB below the stack a fault: the stack is at the start of the SRAM, and without this,

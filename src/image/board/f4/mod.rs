@@ -1,7 +1,7 @@
 //! Boards with an STM32F405, STM32F407 or STM32F446.
 
 mod angles;
-mod boards;
+mod chosen;
 mod clock;
 mod crash;
 mod encoders;
@@ -13,14 +13,13 @@ mod sensors;
 mod serial;
 mod steps;
 mod supply;
-mod ticks;
 mod watchdog;
-mod wiring;
 
 use crate::pac::{EXTI, PWR, Peripherals};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
 use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
+pub(crate) use upright::boards::f4::TICK_US;
 use upright::control::encoder::{CounterWidth, is_at_end};
 use upright::flash_image::WordSums;
 use upright::gains::{SENSORS, STATES};
@@ -36,11 +35,10 @@ use sensors::{ANY_IS_ABSOLUTE, ANY_IS_ON_BUS, WIPER_BITS, WIPER_WIRE};
 pub(crate) use serial::{DmaBuffer, DmaLine};
 use steps::Steps;
 use supply::Supply;
-pub(crate) use ticks::TICK_US;
 use watchdog::Watchdog;
 
 /// The pins and peripherals of the control task.
-pub(crate) struct F4Board {
+pub(crate) struct F4Hardware {
     motor: Motor,
     /// One, if the drive takes pulses.
     steps: [Steps; GIVES_PULSES as usize],
@@ -66,7 +64,7 @@ pub(crate) fn set_up(
     device: Peripherals,
     buffer: &'static mut DmaBuffer,
     table: &'static GainTable<STATES, SENSORS>,
-) -> (F4Board, DmaLine, MemoryCheck, Start) {
+) -> (F4Hardware, DmaLine, MemoryCheck, Start) {
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
@@ -92,7 +90,7 @@ pub(crate) fn set_up(
     // In this order: what changes in between is found by the check.
     let memory = MemoryCheck::new(table);
     let image = memory::of_image();
-    let hardware = F4Board {
+    let hardware = F4Hardware {
         motor,
         steps: [const { Steps::new() }; GIVES_PULSES as usize],
         angles,
@@ -110,14 +108,14 @@ pub(crate) fn set_up(
     (hardware, line, memory, Start { reset, crash, image: image.weighted })
 }
 
-impl F4Board {
+impl F4Hardware {
     /// Starts the watchdog. Everything has to be ready for the first tick.
     pub(crate) fn start_watchdog(&self) {
         self.watchdog.start(if self.clock_fault { Clock::Fallback } else { Clock::Full });
     }
 }
 
-impl Board<SENSORS> for F4Board {
+impl Board<SENSORS> for F4Hardware {
     const WIDTHS: [CounterWidth; SENSORS] = encoders::WIDTHS;
     const GIVES_PULSES: bool = GIVES_PULSES;
     /// See [`MemoryCheck`].

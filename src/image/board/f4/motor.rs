@@ -15,11 +15,11 @@
 
 use crate::pac::TIM1;
 use upright::board::Output;
+use upright::boards::wiring::{Signal, wire_of};
 use upright::gains::TABLE;
 
-use super::boards::BOARD;
+use super::chosen::BOARD;
 use super::pins;
-use super::wiring::{Signal, wire_of};
 use crate::CYCLES_PER_TICK;
 
 /// Whether the drive of the gain table takes pulses, which `steps.rs` gives in place of the PWM.

@@ -1,10 +1,10 @@
 //! The pins: set up from the wiring, read and written by name.
 
 use crate::pac::{EXTI, SYSCFG};
+use upright::boards::wiring::{PinMode, Signal, Wire, wire_of};
 
-use super::boards::BOARD;
+use super::chosen::BOARD;
 use super::sensors;
-use super::wiring::{PinMode, Signal, Wire, wire_of};
 
 const DIRECTION: Wire = wire_of(BOARD.wiring, Signal::Direction);
 const ENABLE: Wire = wire_of(BOARD.wiring, Signal::Enable);

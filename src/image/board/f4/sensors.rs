@@ -1,14 +1,12 @@
 //! Which sensors of the rig are absolute, and what that means for the pins.
 
+use upright::boards::f4::ANGLE_BITS;
+pub(super) use upright::boards::f4::WIPER_BITS;
+use upright::boards::wiring::{PinMode, Signal, Wire, wire_of};
 use upright::gains::{SENSORS, TABLE};
 
-use super::boards::BOARD;
-use super::wiring::{PinMode, Signal, Wire, wire_of};
+use super::chosen::BOARD;
 
-/// Bits of an absolute sensor on the bus.
-pub(super) const BITS: u32 = 14;
-/// Bits of the converter, which reads a potentiometer.
-pub(super) const WIPER_BITS: u32 = 12;
 /// The sensor that may be a potentiometer, and the pin of its wiper: channel B of the encoder in its place.
 const WIPER: usize = 1;
 const WIPER_SIGNAL: Signal = Signal::Encoder(WIPER as u8, b'B');
@@ -19,7 +17,7 @@ pub(super) const ANY_IS_ON_BUS: bool = {
     while sensor < SENSORS {
         if is_on_bus(sensor) {
             let turn = TABLE.absolute.turn_counts(&TABLE.limits, sensor);
-            assert!(turn == 1 << BITS, "an absolute sensor of other bits");
+            assert!(turn == 1 << ANGLE_BITS, "an absolute sensor of other bits");
             any = true;
         }
         sensor += 1;

@@ -2,13 +2,13 @@
 //! none is lost while a tick runs.
 
 use core::cell::UnsafeCell;
-
-use crate::pac::{DMA1, USART2, USART3, usart1};
 use upright::protocol::BAUD;
 use upright::protocol::serial_link::MAX_MESSAGE;
 
-use super::boards::BOARD;
-use super::wiring::{Signal, wire_of};
+use crate::pac::{DMA1, USART2, USART3, usart1};
+
+use super::chosen::BOARD;
+use upright::boards::wiring::{Signal, wire_of};
 
 /// Size of the receive buffer (bytes): more than arrive while the background task does not run.
 const RECEIVED: usize = 512;

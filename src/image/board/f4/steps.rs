@@ -9,16 +9,13 @@
 //! drive off.
 
 use upright::board::Output;
+use upright::boards::PULSES_HZ;
+use upright::boards::f4::PULSES;
 use upright::gains::TABLE;
 
 use super::motor::Motor;
 use super::pins;
 use crate::CYCLES_PER_TICK;
-
-/// Most pulses in a tick: what the repetition counter holds.
-const MOST: u32 = 256;
-/// Most pulses in a second: a driver needs 2.5 µs from a change of direction to a pulse.
-const MOST_HZ: f32 = 200_000.0;
 
 /// Processor cycles between the end of the pulses and the next start: a fiftieth of the tick, but no less than the time
 /// of a tick's code before its start, so that the pulses belong to one tick.
@@ -35,7 +32,7 @@ const _: () = {
         let tick_s = CYCLES_PER_TICK as f32 / super::CLOCK_HZ as f32;
         // Positions are rounded, so a tick may have a pulse more than its speed needs.
         assert!(
-            rate <= MOST_HZ && rate * tick_s <= (MOST - 1) as f32,
+            rate <= PULSES_HZ && rate * tick_s <= (PULSES - 1) as f32,
             "actuator.step_rate_limit_hz: the board gives fewer pulses"
         );
     }
@@ -71,7 +68,7 @@ impl Steps {
             return;
         }
         let pulses = output.pulses();
-        let number = pulses.unsigned_abs().min(MOST);
+        let number = pulses.unsigned_abs().min(PULSES);
         if let Some(interval) = CYCLES.checked_div(number) {
             self.given = self.given.wrapping_add(if pulses > 0 { number } else { number.wrapping_neg() });
             let divider = interval >> 16;

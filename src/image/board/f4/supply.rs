@@ -1,10 +1,10 @@
 //! The A/D converter: the supply voltage of the power stage, and the wiper of a potentiometer.
 
 use crate::pac::{ADC_COMMON, ADC1};
+use upright::boards::wiring::Wire;
 
-use super::boards::BOARD;
+use super::chosen::BOARD;
 use super::sensors::WIPER_WIRE;
-use super::wiring::Wire;
 
 /// Input 12 is the supply, input 17 the internal reference (RM0090, 13.10).
 const SUPPLY: u8 = 12;

@@ -1,9 +1,10 @@
 //! What the RP2040 has otherwise than the RP2350.
 
 pub(in crate::board) use hal::pac::{USBCTRL_DPRAM as UsbMemory, USBCTRL_REGS as UsbRegisters};
+use upright::boards::rp::RpChip;
 
 /// Processor clock (Hz).
-pub(crate) const CLOCK_HZ: u32 = 125_000_000;
+pub(crate) const CLOCK_HZ: u32 = RpChip::Rp2040.clock_hz();
 
 /// Bits of the blocks that this image uses, in RESETS (2.14.3): converter, pins, pads, both PIO, PWM.
 pub(in crate::board) const BLOCKS: u32 = 1 << 0 | 1 << 5 | 1 << 8 | 1 << 10 | 1 << 11 | 1 << 14;

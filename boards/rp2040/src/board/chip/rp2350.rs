@@ -2,9 +2,10 @@
 
 use hal::block::ImageDef;
 pub(in crate::board) use hal::pac::{USB as UsbRegisters, USB_DPRAM as UsbMemory};
+use upright::boards::rp::RpChip;
 
 /// Processor clock (Hz).
-pub(crate) const CLOCK_HZ: u32 = 150_000_000;
+pub(crate) const CLOCK_HZ: u32 = RpChip::Rp2350.clock_hz();
 
 /// Bits of the blocks that this image uses, in RESETS (7.5.3): converter, pins, pads, both PIO, PWM.
 pub(in crate::board) const BLOCKS: u32 = 1 << 0 | 1 << 6 | 1 << 9 | 1 << 11 | 1 << 12 | 1 << 16;

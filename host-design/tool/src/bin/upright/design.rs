@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use upright::boards::BOARDS;
 use upright::table::{Law, PerLaw};
 use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::table::{Gains, TableValues, gains_source, identity_differences, write_atomically};
 use upright_plan::{Stored, SwingUpError};
-use upright_tool::image::BoardName;
 use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
@@ -165,9 +165,13 @@ fn refuse_failing_table(rig: &Rig, reports: &[LawReport]) -> Result<(), Failure>
 /// Warns of a tick that none of the boards can make: the table would compile for another one only.
 fn warn_of_tick(rig: &Rig) {
     let period_s = rig.tick.period_s;
-    let is_possible = |[shortest_s, longest_s]: [f64; 2]| shortest_s <= period_s && period_s <= longest_s;
-    if !BoardName::ALL.into_iter().any(|board| is_possible(board.tick_s())) {
-        eprintln!("warning: tick.period_s = {period_s} s: no board of docs/board.md can make this tick");
+    let period_us = period_s * 1e6;
+    let is_possible =
+        |[shortest, longest]: [u32; 2]| shortest as f64 <= period_us && period_us <= longest as f64;
+    if !BOARDS.iter().any(|board| is_possible(board.tick_us())) {
+        eprintln!(
+            "warning: tick.period_s = {period_s} s: no board of `upright firmware boards` can make this tick"
+        );
     }
 }
 

@@ -3,17 +3,15 @@
 use std::path::Path;
 
 use clap::ValueEnum;
-use upright_board::Image;
+use upright::boards::DEFAULT_BOARD;
+use upright_board::{Conditions, Image};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_tool::image::{self, BoardName};
+use upright_tool::image;
 use upright_tool::in_the_loop::RunPlace;
 
 use crate::failure::Failure;
 use upright_tool::progress::with_spinner;
-
-/// The board that the virtual board simulates.
-const BOARD: BoardName = BoardName::WeactF405;
 
 /// Where the firmware runs.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -27,7 +25,7 @@ pub(crate) enum TargetOption {
 /// A firmware, built for its target.
 pub(crate) enum Built {
     Host,
-    Board(Image),
+    Board(Image, Conditions),
 }
 
 impl TargetOption {
@@ -44,9 +42,9 @@ impl TargetOption {
         match self {
             TargetOption::Host => Ok(Built::Host),
             TargetOption::Board => {
-                let board = BOARD;
-                let image = with_spinner("building the image", || image::build_for(board, rig, table))?;
-                Ok(Built::Board(read(&image)?))
+                let image =
+                    with_spinner("building the image", || image::build_for(DEFAULT_BOARD, rig, table))?;
+                Ok(Built::Board(read(&image.elf)?, image::conditions(DEFAULT_BOARD, 1)?))
             }
         }
     }
@@ -57,7 +55,9 @@ impl Built {
     pub(crate) fn place(&self, seed: u64) -> RunPlace<'_> {
         match self {
             Built::Host => RunPlace::Host,
-            Built::Board(image) => RunPlace::Board { image, conditions: BOARD.conditions(seed) },
+            Built::Board(image, typical) => {
+                RunPlace::Board { image, conditions: Conditions { seed, ..*typical } }
+            }
         }
     }
 }

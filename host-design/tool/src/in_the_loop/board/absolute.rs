@@ -1,11 +1,10 @@
 //! Absolute sensors of the rig at the pins of the virtual board.
 
+use upright::boards::f4::{ANGLE_BITS, WIPER_BITS};
 use upright::control::encoder::{AbsoluteSensor, is_at_end};
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright_board::{Input, SimulatedBoard};
 use upright_design::table::TableValues;
-
-use crate::image::BoardName;
 
 /// An absolute sensor.
 pub(super) enum AbsoluteAtPins {
@@ -21,7 +20,7 @@ impl AbsoluteAtPins {
         let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
         table.absolute.is_absolute(sensor).then(|| match is_potentiometer {
             true => Self::Potentiometer,
-            false => Self::OnBus(AbsoluteSensor::new(BoardName::ANGLE_BITS)),
+            false => Self::OnBus(AbsoluteSensor::new(ANGLE_BITS)),
         })
     }
 
@@ -29,12 +28,12 @@ impl AbsoluteAtPins {
     pub(super) fn show(&mut self, board: &mut SimulatedBoard, encoder: usize, count: u32) -> i64 {
         match self {
             Self::OnBus(sensor) => {
-                let reading = count as u16 & ((1 << BoardName::ANGLE_BITS) - 1);
+                let reading = count as u16 & ((1 << ANGLE_BITS) - 1);
                 board.apply(Input::Angle { encoder, reading });
                 i64::from(sensor.count(reading.into()) as i32)
             }
             Self::Potentiometer => {
-                let range = 1 << BoardName::WIPER_BITS;
+                let range = 1 << WIPER_BITS;
                 let reading = count & (range - 1);
                 // The middle of a step.
                 board.apply(Input::Wiper((reading as f32 + 0.5) / range as f32));
@@ -46,6 +45,6 @@ impl AbsoluteAtPins {
     /// What marks a bad sample of this position (counts) for the firmware on the host.
     pub(super) fn mark(&self, position: i64) -> u32 {
         let is_potentiometer = matches!(self, Self::Potentiometer);
-        if is_potentiometer && is_at_end(position as u32, BoardName::WIPER_BITS) { BAD_SAMPLE } else { 0 }
+        if is_potentiometer && is_at_end(position as u32, WIPER_BITS) { BAD_SAMPLE } else { 0 }
     }
 }

@@ -1,7 +1,8 @@
 //! `upright firmware boards`
 
 use clap::Args;
-use upright_tool::image::{BoardFacts, board_facts};
+use serde_json::json;
+use upright::boards::{BOARDS, BoardRow, Family};
 
 use crate::failure::Failure;
 use crate::output::print;
@@ -18,25 +19,48 @@ pub(crate) struct BoardsCommand {
     json: bool,
 }
 
+/// No image has run on a real board yet.
+const REAL: &str = "real board: none yet";
+
 impl BoardsCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let facts = board_facts();
-        print(self.json, &serde_json::json!(facts), || table(&facts))?;
+        let facts = |board: &BoardRow| {
+            json!({
+                "name": board.name,
+                "product": board.product,
+                "chip": board.chip(),
+                "encoders": board.encoders(),
+                "tick_s": board.tick_us().map(|us| f64::from(us) / 1e6),
+                "executed": [executed(board), REAL],
+            })
+        };
+        print(self.json, &BOARDS.iter().map(facts).collect::<Vec<_>>(), table)?;
         Ok(())
     }
 }
 
-fn table(facts: &[BoardFacts]) -> String {
+/// Where its image has been executed.
+fn executed(board: &BoardRow) -> &'static str {
+    match &board.family {
+        Family::F4(_) => "virtual board",
+        Family::Rp(board) => board.executed,
+    }
+}
+
+fn table() -> String {
     let mut text = format!(
-        "{:<15} {:<27} {:<10} {:>8}  {:<16} {}\n",
+        "{:<15} {:<34} {:<10} {:>8}  {:<16} {}\n",
         "board", "product", "chip", "encoders", "tick", "executed"
     );
-    for BoardFacts { name, product, chip, encoders, tick_s: [shortest_s, longest_s], executed } in facts {
-        let ms = |time_s: &f64| (time_s * 1e6).round() / 1e3;
-        let tick = format!("{} to {} ms", ms(shortest_s), ms(longest_s));
+    for board in &BOARDS {
+        let [shortest_ms, longest_ms] = board.tick_us().map(|us| f64::from(us) / 1e3);
+        let tick = format!("{shortest_ms} to {longest_ms} ms");
         text += &format!(
-            "{name:<15} {product:<27} {chip:<10} {encoders:>8}  {tick:<16} {}\n",
-            executed.join("; ")
+            "{board:<15} {:<34} {:<10} {:>8}  {tick:<16} {}; {REAL}\n",
+            board.product,
+            board.chip(),
+            board.encoders(),
+            executed(board)
         );
     }
     text

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::board::{AnyBoard, AnyBoardOption};
-use super::built::{built, built_for_pico};
+use super::board::BoardOption;
+use super::built::built;
 use super::cycles::check_ticks;
 use crate::failure::Failure;
 use crate::variation::Wanted;
@@ -28,7 +28,7 @@ pub(crate) struct BuildCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
-    on: AnyBoardOption,
+    on: BoardOption,
     /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
@@ -40,15 +40,9 @@ pub(crate) struct BuildCommand {
 impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
-        let image = match self.on.board {
-            AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), wanted)?.uf2,
-            AnyBoard::F4(board) => {
-                let image = built(board, self.rig.as_deref(), wanted)?;
-                check_ticks(board, self.rig.as_deref(), wanted, &image)?;
-                image
-            }
-        };
-        writeln!(std::io::stdout(), "{}", image.display())?;
+        let built = built(self.on.board, self.rig.as_deref(), wanted)?;
+        check_ticks(self.on.board, &built)?;
+        writeln!(std::io::stdout(), "{}", built.image.flashed().display())?;
         Ok(())
     }
 }

@@ -1,49 +1,57 @@
 //! The image of a rig, and the design that it is built from.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use upright::boards::BoardRow;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, BoardName, PicoBoard, PicoImage};
+use upright_tool::image::{self, BuiltImage, CommittedGains};
 
 use crate::failure::Failure;
 use crate::variation::{Wanted, with_stored_motions, with_table};
 use upright_tool::progress::with_spinner;
 
-/// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
-pub(super) fn built(board: BoardName, rig: Option<&Path>, wanted: Wanted) -> Result<PathBuf, Failure> {
-    let Some(path) = rig else {
-        return Ok(with_spinner("building the image", || image::build(board))?);
-    };
-    let rig = Rig::from_path(path)?;
-    image::check_rig(board, &rig)?;
-    let table = table_of(&rig, path, wanted)?;
-    Ok(with_spinner("building the image", || image::build_for(board, &rig, &table))?)
+/// An image, and the rig and table that it is built from; none if it has src/gains.rs and that is made from no rig in
+/// `rigs/`.
+pub(super) struct ForRig {
+    pub(super) image: BuiltImage,
+    pub(super) design: Option<(Rig, TableValues)>,
 }
 
-/// Builds the image for a Pico or a Pico 2.
-pub(super) fn built_for_pico(
-    board: PicoBoard,
-    rig: Option<&Path>,
-    wanted: Wanted,
-) -> Result<PicoImage, Failure> {
-    let Some(path) = rig else {
-        return Err(Failure::argument("name a rig file: an image for a pico is built from one"));
+/// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
+pub(super) fn built(board: &'static BoardRow, rig: Option<&Path>, wanted: Wanted) -> Result<ForRig, Failure> {
+    let building = "building the image";
+    if let Some(path) = rig {
+        let (rig, table) = designed_for(board, path, wanted)?;
+        let image = with_spinner(building, || image::build_for(board, &rig, &table))?;
+        return Ok(ForRig { image, design: Some((rig, table)) });
+    }
+    let design = match CommittedGains::read()?.rig() {
+        // src/gains.rs has no motions.
+        Some(path) => Some(designed_for(board, &path, Wanted::Nothing)?),
+        None => None,
     };
-    let rig = Rig::from_path(path)?;
-    image::check_rig_for_pico(board, &rig)?;
-    let table = table_of(&rig, path, wanted)?;
-    Ok(with_spinner("building the image", || image::build_pico(board, &rig, &table))?)
+    if let Some((_, table)) = &design {
+        image::check_table(board, table)?;
+    }
+    let image = with_spinner(building, || image::build(board))?;
+    Ok(ForRig { image, design })
+}
+
+/// The same as [`designed`], for a board that can run the rig as far as that is known before.
+fn designed_for(
+    board: &'static BoardRow,
+    path: &Path,
+    wanted: Wanted,
+) -> Result<(Rig, TableValues), Failure> {
+    image::check_rig(board, &Rig::from_path(path)?)?;
+    designed(path, wanted)
 }
 
 /// Reads this rig file and designs its table, with the stored motions.
 pub(super) fn designed(path: &Path, wanted: Wanted) -> Result<(Rig, TableValues), Failure> {
     let rig = Rig::from_path(path)?;
-    let table = table_of(&rig, path, wanted)?;
+    let (_, table) = with_table(&rig, path, Gains::Sampled)?;
+    let table = with_stored_motions(path, &rig, table, wanted)?;
     Ok((rig, table))
-}
-
-fn table_of(rig: &Rig, path: &Path, wanted: Wanted) -> Result<TableValues, Failure> {
-    let (_, table) = with_table(rig, path, Gains::Sampled)?;
-    with_stored_motions(path, rig, table, wanted)
 }

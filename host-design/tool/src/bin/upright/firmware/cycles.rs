@@ -1,23 +1,22 @@
 //! `upright firmware cycles`
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use upright::gains::RIG_HASH;
+use upright::boards::BoardRow;
 use upright::table::Law;
 use upright_board::{Conditions, CoreTiming, Image};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
-use upright_tool::image::{self, BoardName};
+use upright_tool::image::{self, conditions};
 use upright_tool::in_the_loop::{self, Span, TickFigures};
-use upright_tool::project::checkout;
 use upright_trust::verify::at_rest_disturbed;
 
 use super::board::BoardOption;
-use super::built::designed;
+use super::built::{ForRig, designed};
 use crate::failure::Failure;
 use crate::output::print;
 use crate::target::read;
@@ -55,16 +54,17 @@ pub(crate) struct CyclesCommand {
 
 impl CyclesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        let typical = conditions(self.on.board, 1)?;
         let (rig, table) = designed(&self.rig, Wanted::SwingUp)?;
         let image = with_spinner("building the image", || image::build_for(self.on.board, &rig, &table))?;
-        let image = read(&image)?;
+        let image = read(&image.elf)?;
         let by = |timing| {
-            let conditions = Conditions { timing, ..self.on.board.conditions(1) };
+            let conditions = Conditions { timing, ..typical };
             measured(&rig, &table, &image, &conditions, self.law, self.duration)
         };
         let [cycles, slow] = CoreTiming::ALL.map(by);
         let (cycles, slow) = (cycles?, slow?);
-        let (board, law) = (self.on.board.name(), self.law.option());
+        let (board, law) = (self.on.board.name, self.law.option());
         let object = json!({ "rig": rig.name, "board": board, "law": law, "cycles": cycles, "slow": slow });
         print(self.json, &object, || {
             CoreTiming::ALL
@@ -99,27 +99,18 @@ pub(super) fn measured(
 const CHECKED_S: f64 = 0.5;
 
 /// Refuses an image with a tick that is too long for the board, and one that has an observer but does not balance, so
-/// that its ticks cannot be measured. Without `rig`, the rig of src/gains.rs is looked up in `rigs/`.
-pub(super) fn check_ticks(
-    board: BoardName,
-    rig: Option<&Path>,
-    wanted: Wanted,
-    image: &Path,
-) -> Result<(), Failure> {
-    let Some(path) = rig.map(Path::to_owned).or_else(rig_of_the_gains) else {
+/// that its ticks cannot be measured. Only the virtual board measures: a Pico's ticks are known from its emulator.
+pub(super) fn check_ticks(board: &'static BoardRow, built: &ForRig) -> Result<(), Failure> {
+    let Ok(conditions) = conditions(board, 1) else { return Ok(()) };
+    let Some((rig, table)) = &built.design else {
         eprintln!(
             "the ticks are not checked: the rig of src/gains.rs is not in rigs/; check them with `upright firmware \
              cycles RIG`"
         );
         return Ok(());
     };
-    let (of_file, mut table) = designed(&path, wanted)?;
-    if rig.is_none() {
-        // src/gains.rs has no motions.
-        table.swing_up = None;
-    }
     let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
-    let cycles = measured(&of_file, &table, &read(image)?, &board.conditions(1), law, CHECKED_S)?;
+    let cycles = measured(rig, table, &read(&built.image.elf)?, &conditions, law, CHECKED_S)?;
     let Span { cycles: longest, us } = cycles.all.whole;
     eprintln!(
         "the longest of {} ticks takes {us:.1} µs ({longest} cycles, approximately), {:.1} % of its period",
@@ -137,13 +128,6 @@ pub(super) fn check_ticks(
         }
         None => Ok(()),
     }
-}
-
-/// The file in `rigs/` that src/gains.rs is made from.
-fn rig_of_the_gains() -> Option<PathBuf> {
-    let files = std::fs::read_dir(checkout().ok()?.join("rigs")).ok()?;
-    let mut rigs = files.filter_map(|file| Some(file.ok()?.path()));
-    rigs.find(|path| Rig::from_path(path).is_ok_and(|rig| rig.hash() == RIG_HASH))
 }
 
 fn table_of(timing: CoreTiming, cycles: &in_the_loop::TickCycles) -> String {

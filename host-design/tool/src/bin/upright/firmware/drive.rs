@@ -2,25 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use upright_tool::image::PicoBoard;
+use upright::boards::BoardRow;
 
 use crate::failure::Failure;
 
 /// A file that the boot loader puts on its drive. A line of it names the board.
 const INFO: &str = "INFO_UF2.TXT";
 
-/// Copies a UF2 file to the drive. The board then restarts with it.
-pub(super) fn copy_to_drive(board: PicoBoard, uf2: &Path) -> Result<(), Failure> {
-    let Some(drive) = drive(board, &places()) else {
+/// Copies a UF2 file to the drive with this name. The board then restarts with it.
+pub(super) fn copy_to_drive(board: &BoardRow, name: &str, uf2: &Path) -> Result<(), Failure> {
+    let Some(drive) = drive(name, &places()) else {
         return Err(Failure::check(format!(
             "no {}: hold its BOOTSEL button while you plug it in, and run this again; or copy {} to the drive {}",
-            board.product(),
+            board.product,
             uf2.display(),
-            board.drive()
+            name
         )));
     };
     std::fs::copy(uf2, drive.join("upright.uf2"))?;
-    println!("copied to {}: the {} restarts with it", drive.display(), board.product());
+    println!("copied to {}: the {} restarts with it", drive.display(), board.product);
     Ok(())
 }
 
@@ -35,9 +35,9 @@ fn places() -> Vec<PathBuf> {
     places
 }
 
-/// The drive of this board: in one of these folders, or a drive letter of Windows.
-fn drive(board: PicoBoard, places: &[PathBuf]) -> Option<PathBuf> {
-    let line = format!("Board-ID: {}", board.drive());
+/// The drive with this name: in one of these folders, or a drive letter of Windows.
+fn drive(name: &str, places: &[PathBuf]) -> Option<PathBuf> {
+    let line = format!("Board-ID: {name}");
     let letters = ('D'..='Z').filter(|_| cfg!(windows)).map(|letter| PathBuf::from(format!("{letter}:\\")));
     let mounted = places.iter().flat_map(|place| folders(place)).chain(letters);
     mounted.into_iter().find(|folder| {
@@ -61,7 +61,7 @@ mod tests {
         let stick = place.path().join("stick");
         std::fs::create_dir(&stick).unwrap();
         std::fs::write(stick.join(INFO), "UF2 Bootloader\nBoard-ID: another\n").unwrap();
-        assert_eq!(drive(PicoBoard::Pico, &[place.path().to_owned()]), None);
+        assert_eq!(drive("RPI-RP2", &[place.path().to_owned()]), None);
         let pico = place.path().join("RPI-RP2");
         std::fs::create_dir(&pico).unwrap();
         std::fs::write(
@@ -69,7 +69,7 @@ mod tests {
             "UF2 Bootloader v3.0\r\nModel: Raspberry Pi RP2\r\nBoard-ID: RPI-RP2\r\n",
         )
         .unwrap();
-        assert_eq!(drive(PicoBoard::Pico, &[place.path().to_owned()]), Some(pico));
-        assert_eq!(drive(PicoBoard::Pico2, &[place.path().to_owned()]), None);
+        assert_eq!(drive("RPI-RP2", &[place.path().to_owned()]), Some(pico));
+        assert_eq!(drive("RP2350", &[place.path().to_owned()]), None);
     }
 }

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
+use upright::boards::Family;
 
-use super::board::{AnyBoard, AnyBoardOption};
-use super::built::{built, built_for_pico};
+use super::board::BoardOption;
+use super::built::built;
 use super::cycles::check_ticks;
 use super::drive::copy_to_drive;
 use crate::failure::Failure;
@@ -27,7 +28,7 @@ pub(crate) struct FlashCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
-    on: AnyBoardOption,
+    on: BoardOption,
     /// Include the stored motions between other equilibria
     #[arg(long, requires = "rig")]
     transitions: bool,
@@ -39,22 +40,24 @@ pub(crate) struct FlashCommand {
 impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
-        let board = match self.on.board {
-            AnyBoard::Pico(board) => {
-                return copy_to_drive(board, &built_for_pico(board, self.rig.as_deref(), wanted)?.uf2);
+        let board = self.on.board;
+        let build = || built(board, self.rig.as_deref(), wanted);
+        match &board.family {
+            Family::Rp(rp) => copy_to_drive(board, rp.chip.drive(), build()?.image.flashed()),
+            Family::F4(f4) => {
+                // Checked first, because building the image takes longer.
+                if Command::new(PROBE_RS).arg("--version").output().is_err() {
+                    return Err(Failure::no_program(
+                        "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
+                    ));
+                }
+                let built = build()?;
+                check_ticks(board, &built)?;
+                let chip = format!("{}{}", f4.chip.name(), f4.package);
+                probe_rs(&["download", "--verify", "--chip", &chip], Some(&built.image.elf))?;
+                probe_rs(&["reset", "--chip", &chip], None)
             }
-            AnyBoard::F4(board) => board,
-        };
-        // Checked first, because building the image takes longer.
-        if Command::new(PROBE_RS).arg("--version").output().is_err() {
-            return Err(Failure::no_program(
-                "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
-            ));
         }
-        let image = built(board, self.rig.as_deref(), wanted)?;
-        check_ticks(board, self.rig.as_deref(), wanted, &image)?;
-        probe_rs(&["download", "--verify", "--chip", board.chip()], Some(&image))?;
-        probe_rs(&["reset", "--chip", board.chip()], None)
     }
 }
 

@@ -9,8 +9,8 @@ use upright_tool::image::{
     ImagePart, LinkedImage, StackBound, StackError, forbidden_functions, size, stack_bound, wrong_functions,
 };
 
-use super::board::{AnyBoard, AnyBoardOption};
-use super::built::{built, built_for_pico};
+use super::board::BoardOption;
+use super::built::built;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::variation::Wanted;
@@ -30,7 +30,7 @@ pub(crate) struct SizeCommand {
     /// Rig file (TOML) to design the table from [default: the table in src/gains.rs]
     rig: Option<PathBuf>,
     #[command(flatten)]
-    on: AnyBoardOption,
+    on: BoardOption,
     /// Measure this image instead of building one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rig", "board"])]
     elf: Option<PathBuf>,
@@ -43,10 +43,7 @@ impl SizeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => match self.on.board {
-                AnyBoard::Pico(board) => built_for_pico(board, self.rig.as_deref(), Wanted::SwingUp)?.elf,
-                AnyBoard::F4(board) => built(board, self.rig.as_deref(), Wanted::SwingUp)?,
-            },
+            None => built(self.on.board, self.rig.as_deref(), Wanted::SwingUp)?.image.elf,
         };
         let image = LinkedImage::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));

@@ -4,37 +4,37 @@
 //! Alternate functions: datasheets DS8626 (F405, F407) and DS10693 (F446), table "Alternate function mapping".
 
 /// A pin of port `A`, `B`, `C` or `D`, and what is connected to it.
-#[derive(Clone, Copy)]
-pub(crate) struct Wire {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wire {
     /// What is connected.
-    pub(crate) signal: Signal,
+    pub signal: Signal,
     /// The port's letter.
-    pub(crate) port: u8,
+    pub port: u8,
     /// Number within the port.
-    pub(crate) pin: u8,
+    pub pin: u8,
     /// Electrical mode of the pin.
-    pub(crate) mode: PinMode,
+    pub mode: PinMode,
     /// Whether the pin is pulled to 3.3 V inside the microcontroller (about 40 kΩ).
-    pub(crate) pull_up: bool,
+    pub pull_up: bool,
     /// The peripheral behind the pin, which says which timer and which USART are used.
-    pub(crate) function: &'static str,
+    pub function: &'static str,
 }
 
 impl Wire {
     /// Base address of the registers of its port (RM0090, 2.3).
-    pub(crate) const fn port_base(self) -> usize {
+    pub const fn port_base(self) -> usize {
         0x4002_0000 + 0x400 * (self.port - b'A') as usize
     }
 
     /// The digit after `name` in its function: 3 for `TIM` in `TIM3_CH1`.
-    pub(crate) const fn number(self, name: &str) -> u8 {
+    pub const fn number(self, name: &str) -> u8 {
         self.function.as_bytes()[name.len()] - b'0'
     }
 }
 
 /// What is connected to a pin.
-#[derive(Clone, Copy)]
-pub(crate) enum Signal {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Signal {
     /// An encoder: sensor (0 is the cart's) and channel, 'A' or 'B'.
     Encoder(u8, u8),
     /// PWM input of the power stage: high drives.
@@ -94,8 +94,8 @@ impl Signal {
 }
 
 /// Mode of a pin; the numbers are those of the register GPIOx_MODER (RM0090, 8.4.1).
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum PinMode {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PinMode {
     /// Digital input.
     Input,
     /// Push-pull output, initially low.
@@ -108,7 +108,7 @@ pub(crate) enum PinMode {
 
 /// The wiring of all boards that leave these pins free: the pins exist on the 64-pin packages of STM32F405, STM32F407
 /// and STM32F446, with the same functions. The status LED differs from board to board.
-pub(crate) const STANDARD: [Wire; 24] = [
+pub const STANDARD: [Wire; 24] = [
     encoder(0, b'A', b'A', 15, 1, "TIM2_CH1"),
     encoder(0, b'B', b'B', 3, 1, "TIM2_CH2"),
     encoder(1, b'A', b'A', 0, 2, "TIM5_CH1"),
@@ -136,7 +136,7 @@ pub(crate) const STANDARD: [Wire; 24] = [
 ];
 
 /// Number of encoders that a board can count.
-pub(crate) const fn encoders(wiring: &[Wire]) -> usize {
+pub const fn encoders(wiring: &[Wire]) -> usize {
     let (mut count, mut i) = (0, 0);
     while i < wiring.len() {
         if let Signal::Encoder(_, b'A') = wiring[i].signal {
@@ -148,7 +148,7 @@ pub(crate) const fn encoders(wiring: &[Wire]) -> usize {
 }
 
 /// The wire of a signal; a board without it does not compile.
-pub(crate) const fn wire_of(wiring: &[Wire], signal: Signal) -> Wire {
+pub const fn wire_of(wiring: &[Wire], signal: Signal) -> Wire {
     let mut i = 0;
     while i < wiring.len() {
         if wiring[i].signal.code() == signal.code() {
@@ -159,7 +159,8 @@ pub(crate) const fn wire_of(wiring: &[Wire], signal: Signal) -> Wire {
     panic!("a signal has no pin")
 }
 
-pub(crate) const fn wire(
+/// A pin and what is connected to it; the arguments are the fields of [`Wire`].
+pub const fn wire(
     signal: Signal,
     port: u8,
     pin: u8,
@@ -171,18 +172,11 @@ pub(crate) const fn wire(
 }
 
 /// An output, such as a status LED.
-pub(crate) const fn output(signal: Signal, port: u8, pin: u8) -> Wire {
+pub const fn output(signal: Signal, port: u8, pin: u8) -> Wire {
     wire(signal, port, pin, PinMode::Output, false, "output")
 }
 
 /// An encoder input, with the internal pull-up: the least that an open-collector encoder needs.
-pub(crate) const fn encoder(
-    sensor: u8,
-    channel: u8,
-    port: u8,
-    pin: u8,
-    number: u8,
-    function: &'static str,
-) -> Wire {
+pub const fn encoder(sensor: u8, channel: u8, port: u8, pin: u8, number: u8, function: &'static str) -> Wire {
     wire(Signal::Encoder(sensor, channel), port, pin, PinMode::Alternate(number), true, function)
 }
