@@ -15,7 +15,7 @@ mod rows;
 pub mod rp;
 pub mod wiring;
 
-pub use row::{BoardRow, Family, PULSES_HZ};
+pub use row::{BoardRow, Family, PULSES_HZ, cycles_per_tick};
 pub use rows::BOARDS;
 
 /// The board where none is named.

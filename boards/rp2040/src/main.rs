@@ -18,12 +18,7 @@ mod gains {
 }
 
 /// Processor cycles per tick, at the period for which the gains were designed.
-const CYCLES_PER_TICK: u32 = {
-    let tick_us = (gains::TICK_S as f64 * 1e6 + 0.5) as u32;
-    let [shortest, longest] = board::TICK_US;
-    assert!(tick_us >= shortest && tick_us <= longest, "tick.period_s: the board cannot make this tick");
-    (gains::TICK_S as f64 * board::CLOCK_HZ as f64 + 0.5) as u32
-};
+const CYCLES_PER_TICK: u32 = upright::boards::cycles_per_tick(gains::TICK_S, board::CLOCK_HZ, board::TICK_US);
 
 #[rtic::app(device = hal::pac, peripherals = true)]
 mod app {
