@@ -29,17 +29,32 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(15),
-    // Number of states; equal to `NX` in a sound table.
-    states: 10,
-    // Number of sensors; equal to `NY` in a sound table.
-    sensors: 5,
+    format: upright::table_format!(16),
+    // Numbers of states and sensors; equal to `NX` and `NY` in a sound table.
+    dimensions: [10, 5],
     // Index of the state that follows the set-point.
     output: 0,
     // Hash of the rig file's values.
     rig_hash: RIG_HASH,
     // Control period (s).
     tick_s: TICK_S,
+    // The sensors; the first one is the cart's.
+    sensors: [
+        // - state: Index of the state that it measures.
+        // - kind: How it reads.
+        // - step: Travel per count (m or rad).
+        // - delay_s: Age of a reading (s): it shows the state as it was, less the next state, the rate, by this time.
+        // - turn_counts: A whole turn of the joint; 0 for the cart (counts).
+        // - rest_counts: Position while the links hang at rest: half a turn for the first link, else 0 (counts).
+        // - sign_counts: Distance that it has to be moved when its sign is checked (counts).
+        // - slow_counts: Largest motion within `arm_ticks` that is still slow (counts).
+        // - still_counts: Largest motion within `still_ticks` that noise or the edge of a step show (counts).
+        SensorRow { state: 0, kind: SensorKind::Counter, step: 2e-5, delay_s: 0.0, turn_counts: 0, rest_counts: 0, sign_counts: 10000, slow_counts: 750, still_counts: 1 },
+        SensorRow { state: 2, kind: SensorKind::Counter, step: 0.0015339808, delay_s: 0.0, turn_counts: 4096, rest_counts: 2048, sign_counts: 130, slow_counts: 20, still_counts: 1 },
+        SensorRow { state: 4, kind: SensorKind::Counter, step: 0.0015339808, delay_s: 0.0, turn_counts: 4096, rest_counts: 0, sign_counts: 130, slow_counts: 20, still_counts: 1 },
+        SensorRow { state: 6, kind: SensorKind::Counter, step: 0.0015339808, delay_s: 0.0, turn_counts: 4096, rest_counts: 0, sign_counts: 130, slow_counts: 20, still_counts: 1 },
+        SensorRow { state: 8, kind: SensorKind::Counter, step: 0.0015339808, delay_s: 0.0, turn_counts: 4096, rest_counts: 0, sign_counts: 130, slow_counts: 20, still_counts: 1 },
+    ],
     // The drive of the cart.
     drive: DriveMap::Force(ForceMap {
         // Largest force on the cart (N).
@@ -107,12 +122,6 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             [-0.00025413898, 0.019720752, 0.011200503, 8.207529, -0.09525836, -22.10352, 0.15265201, 21.2384, -0.058351077, -9.82073],
             [3.4139796e-7, 0.0034464304, 0.0031852596, -0.80105, 0.007694748, 4.998352, -0.058351077, -9.568677, 0.12238921, 10.166408],
         ]),
-        // Index of the state that each sensor measures.
-        measured: [0, 2, 4, 6, 8],
-        // Travel per count of each sensor (m or rad).
-        step: columns([[2e-5, 0.0015339808, 0.0015339808, 0.0015339808, 0.0015339808]]),
-        // Age of each sensor's reading (s): it shows its state as it was, less the next state, the rate, by this time.
-        delay_s: columns([[0.0, 0.0, 0.0, 0.0, 0.0]]),
     }),
     // Known Coulomb friction, if there is any: it is compensated.
     friction: None,
@@ -145,14 +154,6 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
         travel_counts: [200000, 2000],
         // The middle between the limit switches, from position 0 (counts).
         middle_counts: 0,
-        // Largest motion of each sensor within `arm_ticks` that is still slow (counts).
-        slow_counts: [750, 20, 20, 20, 20],
-        // Position of each sensor while the links hang at rest: half a turn for the first link, else 0 (counts).
-        rest_counts: [0, 2048, 0, 0, 0],
-        // A whole turn of each joint; 0 for the cart (counts).
-        turn_counts: [0, 4096, 4096, 4096, 4096],
-        // Distance that each sensor has to be moved when its sign is checked (counts).
-        sign_counts: [10000, 130, 130, 130, 130],
     },
     // Thresholds at which the supervisor takes encoders and motor to be at fault.
     thresholds: Thresholds {
@@ -175,17 +176,8 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             energy: 1.2662925e-7,
         },
     },
-    // Absolute sensors.
-    absolute: AbsoluteZeros {
-        // Reading of each absolute sensor while the links hang at rest; of the cart's, which has no zero, a turn; -1
-        // for a sensor that only counts (counts).
-        zero_counts: [-1, -1, -1, -1, -1],
-        // Largest motion of each sensor within [`Limits::still_ticks`] that is still: what noise or the edge of a step
-        // show (counts).
-        still_counts: [1, 1, 1, 1, 1],
-    },
     // CRC-32 of all values above.
-    crc: 0x1796_29a0,
+    crc: 0xcdc3_d964,
 };
 
 /// This table has no swing-up.

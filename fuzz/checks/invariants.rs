@@ -169,13 +169,11 @@ impl Invariants {
         assert!(rig.supply_v >= limits.supply_min_v && rig.supply_v.is_finite(), "driven without supply");
         let Some(counts) = self.counts.back() else { panic!("a tick has counts") };
         for (sensor, &count) in counts.iter().enumerate().skip(1) {
-            let turn = i64::from(limits.turn_counts[sensor]);
-            let from_rest = i64::from(count) - i64::from(limits.rest_counts[sensor]);
+            let row = &TABLE.sensors[sensor];
+            let turn = i64::from(row.turn_counts);
+            let from_rest = i64::from(count) - i64::from(row.rest_counts);
             let away = from_rest.rem_euclid(turn).min((-from_rest).rem_euclid(turn));
-            assert!(
-                away <= i64::from(limits.sign_counts[sensor]) / 2 + 1,
-                "driven while a link does not hang"
-            );
+            assert!(away <= i64::from(row.sign_counts) / 2 + 1, "driven while a link does not hang");
         }
     }
 
@@ -190,20 +188,20 @@ impl Invariants {
         assert!(!contacts.clock_fault && !contacts.board_fault);
         assert!(rig.supply_v >= limits.supply_min_v && rig.supply_v.is_finite(), "armed without supply");
         let Some(counts) = self.counts.back() else { panic!("a tick has counts") };
-        let step = |sensor: usize| TABLE.observer.as_ref().map_or(0.0, |observer| observer.step[sensor]);
-        let position_m = step(0) * counts[0] as f32;
+        let position_m = TABLE.sensors[0].step * counts[0] as f32;
         let [low, high] = limits.setpoints_m();
         assert!((low..=high).contains(&position_m), "armed off centre");
         let mut angle = 0.0;
-        for (sensor, (&count, &turn)) in counts.iter().zip(&limits.turn_counts).enumerate().skip(1) {
-            let nearest = (f64::from(count) / f64::from(turn)).round() * f64::from(turn);
-            angle += step(sensor) * (f64::from(count) - nearest) as f32;
+        for (&count, sensor) in counts.iter().zip(&TABLE.sensors).skip(1) {
+            let turn = f64::from(sensor.turn_counts);
+            let nearest = (f64::from(count) / turn).round() * turn;
+            angle += sensor.step * (f64::from(count) - nearest) as f32;
             assert!(angle.abs() <= limits.arm_angle_rad * 1.0001, "armed while tilted");
         }
         for sensor in 0..SENSORS {
             let all = || self.counts.iter().map(|counts| counts[sensor]);
             let (least, most) = (all().min().unwrap_or_default(), all().max().unwrap_or_default());
-            assert!(most.wrapping_sub(least) <= 2 * limits.slow_counts[sensor], "armed while moving");
+            assert!(most.wrapping_sub(least) <= 2 * TABLE.sensors[sensor].slow_counts, "armed while moving");
         }
         let held = self.arm_held_at.is_some_and(|at| self.tick - at < limits.still_ticks);
         assert!(!held, "armed by a command that was held since the fault");

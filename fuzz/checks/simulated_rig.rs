@@ -35,7 +35,7 @@ pub(crate) struct SimulatedRig {
 
 impl SimulatedRig {
     fn new() -> Self {
-        let offset = TABLE.limits.rest_counts;
+        let offset = counts_at_rest();
         let contacts = Contacts::default();
         Self { state: [0.0; STATES], offset, contacts, supply_v: 24.0, output: Output::OFF }
     }
@@ -67,7 +67,7 @@ impl Board<SENSORS> for SimulatedRig {
     fn inputs(&mut self) -> Inputs<SENSORS> {
         let mut raw_counts = [0; SENSORS];
         for (sensor, raw) in raw_counts.iter_mut().enumerate() {
-            let counts = self.state[2 * sensor] / TABLE.observer.as_ref().map_or(1.0, |o| o.step[sensor]);
+            let counts = self.state[2 * sensor] / TABLE.sensors[sensor].step;
             *raw = (counts.round() as i32).wrapping_add(self.offset[sensor]) as u32;
         }
         Inputs { raw_counts, supply_v: self.supply_v, contacts: self.contacts }
@@ -137,6 +137,11 @@ impl Start {
 /// Hanging is just after power-up; shaken is homed, checked, and shaken for some ticks; raised is homed, checked,
 /// upright and still; armed is two ticks before balancing. Stopped is armed and then stopped by the emergency stop,
 /// which is released again: the fault is latched.
+/// Counts of the sensors while the links hang at rest.
+fn counts_at_rest() -> [i32; SENSORS] {
+    TABLE.sensors.map(|sensor| sensor.rest_counts)
+}
+
 pub(crate) fn starts() -> [Start; 6] {
     let limits = &TABLE.limits;
     let firmware = Firmware::new(&TABLE, &NoSwingUp, SimulatedRig::WIDTHS, Reset::Power);
@@ -148,19 +153,19 @@ pub(crate) fn starts() -> [Start; 6] {
     while start.firmware.calibration().signs() != Signs::Checked {
         match start.firmware.calibration().signs() {
             Signs::Rest(_) => {
-                start.move_to(limits.rest_counts);
+                start.move_to(counts_at_rest());
                 start.wait(limits.still_ticks + 1);
             }
             Signs::Move(sensor) => {
-                let mut moved = limits.rest_counts;
-                moved[usize::from(sensor)] += limits.sign_counts[usize::from(sensor)];
+                let mut moved = counts_at_rest();
+                moved[usize::from(sensor)] += TABLE.sensors[usize::from(sensor)].sign_counts;
                 start.move_to(moved);
             }
             signs => panic!("{signs:?}"),
         }
     }
     // The motor pushes the cart; the links hang all the time.
-    start.move_to(limits.rest_counts);
+    start.move_to(counts_at_rest());
     start.wait(limits.arm_ticks);
     start.ask(Request::Jog { along: true });
     while start.firmware.state() == State::Jogging {
@@ -191,7 +196,7 @@ pub(crate) fn starts() -> [Start; 6] {
 
 /// From hanging, with the motor checked, to being shaken.
 fn shaken(mut start: Start) -> Start {
-    start.move_to(TABLE.limits.rest_counts);
+    start.move_to(counts_at_rest());
     start.wait(TABLE.limits.still_ticks + 1);
     start.ask(Request::Shake(SHAKING));
     for force in [10, -10] {

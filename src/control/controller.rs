@@ -125,7 +125,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             started: table
                 .observer
                 .as_ref()
-                .map_or(Mode::WithoutObserver, |gains| Mode::Running(Observer::new(gains))),
+                .map_or(Mode::WithoutObserver, |gains| Mode::Running(Observer::new(gains, &table.sensors))),
             target: zero,
             encoders: Encoders::new(widths),
             estimate: SVector::repeat(zero),
@@ -205,12 +205,9 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
         &mut self.encoders
     }
 
-    /// Positions from the encoders (m, rad); all 0 without an observer.
+    /// Positions from the encoders (m, rad).
     pub fn positions(&self) -> SVector<T, NY> {
-        self.table
-            .observer
-            .as_ref()
-            .map_or_else(|| SVector::repeat(T::default()), |observer| self.encoders.positions(&observer.step))
+        self.encoders.positions(&self.table.sensors)
     }
 
     /// Starts from rest at the counter readings `raw`: rates 0, governed set-point at the present output, no pending
@@ -228,10 +225,12 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// # Errors
     /// [`Rejected::NoObserver`] if the table holds no observer.
     pub fn start_at(&mut self, y: &[T; NY]) -> Result<(), Rejected> {
-        let observer = self.table.observer.as_ref().ok_or(Rejected::NoObserver)?;
+        if self.table.observer.is_none() {
+            return Err(Rejected::NoObserver);
+        }
         let mut x = SVector::<T, NX>::repeat(T::default());
-        for (&state, &position) in observer.measured.iter().zip(y) {
-            if let Some(entry) = x.get_mut(state as usize) {
+        for (sensor, &position) in self.table.sensors.iter().zip(y) {
+            if let Some(entry) = x.get_mut(sensor.state as usize) {
                 *entry = position;
             }
         }
@@ -287,7 +286,7 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
             self.encoders.update(raw);
             return Self::off();
         };
-        let mut y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let mut y = self.encoders.measure(raw, observer.sensors);
         if !self.active.is_plain {
             self.subtract_lead(&mut y);
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use crate::table::Scalar;
+use crate::table::{Scalar, SensorRow};
 
 /// Width of a hardware counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,22 +49,30 @@ impl<const NY: usize> Encoders<NY> {
 
     /// Takes new counter readings. A counter must move by less than half its range between two readings.
     pub fn update(&mut self, raw: &[u32; NY]) {
-        self.measure(raw, &SVector::<f32, NY>::zeros());
+        for (counter, &raw) in raw.iter().enumerate() {
+            self.take(counter, raw);
+        }
     }
 
     /// Takes new counter readings and returns the positions, like [`positions`](Self::positions).
     #[inline(always)]
-    pub(crate) fn measure<T: Scalar>(&mut self, raw: &[u32; NY], step: &SVector<T, NY>) -> SVector<T, NY> {
-        let mut y = *step;
+    pub(crate) fn measure<T: Scalar>(&mut self, raw: &[u32; NY], sensors: &[SensorRow<T>; NY]) -> [T; NY] {
+        let mut y = sensors.each_ref().map(|sensor| sensor.step);
         for (counter, &raw) in raw.iter().enumerate() {
-            let moved = raw.wrapping_sub(self.last[counter]) as i32;
-            // The inner cast keeps the low 16 bits: the signed distance modulo the counter's range.
-            let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
-            self.last[counter] = raw;
-            self.position[counter] = self.position[counter].wrapping_add(moved);
-            y[counter] *= T::from_counts(self.position[counter]);
+            y[counter] *= T::from_counts(self.take(counter, raw));
         }
         y
+    }
+
+    /// Takes the new reading of a counter; returns its position (counts).
+    #[inline(always)]
+    fn take(&mut self, counter: usize, raw: u32) -> i32 {
+        let moved = raw.wrapping_sub(self.last[counter]) as i32;
+        // The inner cast keeps the low 16 bits: the signed distance modulo the counter's range.
+        let moved = if self.of_16_bits & (1 << counter) != 0 { i32::from(moved as i16) } else { moved };
+        self.last[counter] = raw;
+        self.position[counter] = self.position[counter].wrapping_add(moved);
+        self.position[counter]
     }
 
     /// The reading of a counter that moves from its last one to this position (counts).
@@ -78,14 +86,10 @@ impl<const NY: usize> Encoders<NY> {
         &self.position
     }
 
-    /// Positions in SI units; `step` holds the travel per count (m or rad).
+    /// Positions in SI units (m or rad).
     #[inline]
-    pub fn positions<T: Scalar>(&self, step: &SVector<T, NY>) -> SVector<T, NY> {
-        let mut y = *step;
-        for (y, &counts) in y.iter_mut().zip(&self.position) {
-            *y *= T::from_counts(counts);
-        }
-        y
+    pub fn positions<T: Scalar>(&self, sensors: &[SensorRow<T>; NY]) -> SVector<T, NY> {
+        SVector::from_fn(|counter, _| sensors[counter].step * T::from_counts(self.position[counter]))
     }
 }
 
@@ -177,6 +181,7 @@ mod tests {
         let mut encoders = Encoders::new([CounterWidth::Bits32; 2]);
         encoders.home(&[100, 7], &[0, 50]);
         encoders.update(&[98, 8]);
-        assert_eq!(encoders.positions(&SVector::from([0.5f32, 0.25])), SVector::from([-1.0, 12.75]));
+        let of_step = |step| SensorRow { step, ..SensorRow::default() };
+        assert_eq!(encoders.positions(&[0.5f32, 0.25].map(of_step)), SVector::from([-1.0, 12.75]));
     }
 }

@@ -4,26 +4,26 @@
 //! e = y - C x̂⁻,   x̂ = x̂⁻ + L e,   x̂⁻(next tick) = Ad x̂ + Bd u
 //! ```
 
-use crate::table::{ObserverGains, Scalar};
+use crate::table::{ObserverGains, Scalar, SensorRow};
 
 impl<const NX: usize, const NY: usize, T: Scalar> ObserverGains<NX, NY, T> {
-    /// Whether sensor i measures state 2i, as in every chain, and as it is in this tick. Then no index has to be looked
-    /// up.
-    fn sensors_are_in_order(&self) -> bool {
-        let of_this_tick = self.delay_s.data.0[0].iter().all(|&delay_s| delay_s == T::default());
-        of_this_tick && self.measured.iter().zip(0..).all(|(&state, sensor)| state == 2 * sensor)
-    }
-
     /// The entries of Ad that the prediction uses without multiplying.
     pub fn pattern(&self) -> PredictionPattern {
         PredictionPattern::of(&self.ad.data.0)
     }
 }
 
+/// Whether sensor i measures state 2i, as in every chain, and as it is in this tick. Then no index has to be looked up.
+fn are_in_order<T: Scalar>(sensors: &[SensorRow<T>]) -> bool {
+    let is_at = |sensor: &SensorRow<T>, state: u32| sensor.state == state && sensor.delay_s == T::default();
+    sensors.iter().zip(0..).all(|(sensor, number)| is_at(sensor, 2 * number))
+}
+
 /// The observer of a table, with the pattern of its Ad, which saves operations in every tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observer<'t, const NX: usize, const NY: usize, T: Scalar = f32> {
-    pub(crate) gains: &'t ObserverGains<NX, NY, T>,
+    gains: &'t ObserverGains<NX, NY, T>,
+    pub(crate) sensors: &'t [SensorRow<T>; NY],
     pattern: PredictionPattern,
     /// Whether sensor i measures state 2i, without delay.
     is_in_order: bool,
@@ -63,8 +63,8 @@ impl PredictionPattern {
 }
 
 impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
-    pub(crate) fn new(gains: &'t ObserverGains<NX, NY, T>) -> Self {
-        Self { gains, pattern: gains.pattern(), is_in_order: gains.sensors_are_in_order() }
+    pub(crate) fn new(gains: &'t ObserverGains<NX, NY, T>, sensors: &'t [SensorRow<T>; NY]) -> Self {
+        Self { gains, sensors, pattern: gains.pattern(), is_in_order: are_in_order(sensors) }
     }
 
     /// Innovation `e = y - C x̂⁻` (m or rad): measurement minus prediction, for the measured positions y. It is
@@ -104,11 +104,11 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Observer<'t, NX, NY, T> {
     /// What a sensor measures. Not inlined into the unrolled loop over the sensors, it takes half of the code.
     #[inline(never)]
     fn looked_up(&self, sensor: usize, estimate: &[T; NX]) -> T {
-        let of = |sensor: usize| Some((*self.gains.measured.get(sensor)?, *self.gains.delay_s.get(sensor)?));
+        let Some(SensorRow { state, delay_s, .. }) = self.sensors.get(sensor) else { return T::default() };
         // A checked table names only states that exist.
-        match of(sensor).and_then(|(state, delay_s)| Some((estimate.get(state as usize..)?, delay_s))) {
-            Some(([value, rate, ..], delay_s)) => *value - delay_s * *rate,
-            Some(([value], _)) => *value,
+        match estimate.get(*state as usize..) {
+            Some([value, rate, ..]) => *value - *delay_s * *rate,
+            Some([value]) => *value,
             _ => T::default(),
         }
     }
@@ -211,11 +211,9 @@ mod tests {
             ad: matrix![1.0f32, 0.5; 0.0, 1.0],
             bd: vector![0.125, 0.5],
             l: matrix![0.5; 2.0],
-            measured: [0],
-            delay_s: vector![0.0],
-            step: vector![1.0],
         };
-        let observer = Observer::new(&gains);
+        let sensors = [SensorRow::default()];
+        let observer = Observer::new(&gains, &sensors);
         let mut x = [1.0, -1.0];
         let e = observer.innovation(&[3.0], &x);
         observer.correct(&e, &mut x, |joint, x| assert_eq!((joint, x), (0, &[2.0, 3.0][..])));
@@ -226,18 +224,16 @@ mod tests {
 
     #[test]
     fn an_old_reading_is_compared_with_where_the_sensor_was() {
-        let of = |delay_s: f32| ObserverGains {
+        let gains = ObserverGains {
             ad: matrix![1.0f32, 0.5; 0.0, 1.0],
             bd: vector![0.125, 0.5],
             l: matrix![0.5; 2.0],
-            measured: [0],
-            delay_s: vector![delay_s],
-            step: vector![1.0],
         };
+        let of = |delay_s: f32| [SensorRow { delay_s, ..SensorRow::default() }];
         let (old, new) = (of(0.25), of(0.0));
         let estimate = [3.0, -2.0];
-        assert_eq!(Observer::new(&old).innovation(&[4.0], &estimate), [0.5]);
-        assert_eq!(Observer::new(&new).innovation(&[4.0], &estimate), [1.0]);
+        assert_eq!(Observer::new(&gains, &old).innovation(&[4.0], &estimate), [0.5]);
+        assert_eq!(Observer::new(&gains, &new).innovation(&[4.0], &estimate), [1.0]);
     }
 
     #[test]

@@ -5,9 +5,9 @@ use super::Firmware;
 use crate::board::{BadSamples, Inputs};
 use crate::supervision::fault::Fault;
 use crate::supervision::finding::Finding;
-use crate::table::SwingUp;
+use crate::table::{SensorRow, SwingUp};
 
-/// A sensor with this much of [`still_counts`](crate::table::AbsoluteZeros::still_counts) or more has noise of a count.
+/// A sensor with this much of [`still_counts`](crate::table::SensorRow::still_counts) or more has noise of a count.
 const NOISY_STILL_COUNTS: i32 = 8;
 /// While the motor is on, the reading of a noisy sensor stays the same for less time (s). By noise alone, that happens
 /// in no machine's life; the time allows for a file that states too much noise, and for a link that hardly moves.
@@ -38,9 +38,9 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// The first sensor whose noise would have changed its reading within so many ticks.
     fn stands_still(&self, equal_ticks: &[u16; NY]) -> Option<u8> {
         let table = self.table;
-        let mut sensors = equal_ticks.iter().zip(&table.absolute.still_counts).zip(&table.thresholds.frozen);
-        let is_still = |((&ticks, &counts), &threshold): ((&u16, &i32), &f32)| {
-            let is_tested = counts >= NOISY_STILL_COUNTS && threshold < f32::MAX;
+        let mut sensors = equal_ticks.iter().zip(&table.sensors).zip(&table.thresholds.frozen);
+        let is_still = |((&ticks, row), &threshold): ((&u16, &SensorRow), &f32)| {
+            let is_tested = row.still_counts >= NOISY_STILL_COUNTS && threshold < f32::MAX;
             is_tested && f32::from(ticks) * table.tick_s > LONGEST_EQUAL_S
         };
         let sensor = sensors.position(is_still)?;

@@ -51,7 +51,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// A tick while armed: balancing starts when all links have been upright and slow for long enough.
     pub(super) fn tick_armed(&mut self, counts: &[i32; NY]) {
         let limits = &self.table.limits;
-        let upright = limits.within_half_a_turn(counts);
+        let upright = self.table.within_half_a_turn(counts);
         let lean = self.largest_lean(&upright);
         if lean > limits.angle_rad
             || !self.input_inhibits().union(self.off_centre_inhibit(counts, limits.setpoints_m())).is_empty()

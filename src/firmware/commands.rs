@@ -82,7 +82,11 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 
     /// Homes at the present position: the cart is at 0, and the links hang still or swing about hanging.
     fn home_here(&mut self) -> Result<(), Inhibits> {
-        let position = self.calibration.hanging(self.controller.encoders().counts(), &self.table.limits)?;
+        let position = self.calibration.hanging(
+            self.controller.encoders().counts(),
+            &self.table.sensors,
+            &self.table.limits,
+        )?;
         self.home(&position)
     }
 
@@ -97,15 +101,15 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 
     /// Starts the sign check.
     fn check_signs(&mut self) -> Result<(), Inhibits> {
-        let limits = &self.table.limits;
-        let hanging = links_hang(self.controller.encoders().counts(), limits);
+        let sensors = &self.table.sensors;
+        let hanging = links_hang(self.controller.encoders().counts(), sensors);
         let not_homed = Inhibits::NOT_HOMED.when(self.supervisor.state() != State::Calibrated);
         Inhibits::NOT_HANGING
             .when(!hanging)
             .union(self.supervisor.arming_inhibits())
             .union(not_homed)
             .err_if_any()?;
-        self.calibration.start_sign_check(limits);
+        self.calibration.start_sign_check(sensors);
         Ok(())
     }
 

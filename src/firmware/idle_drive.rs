@@ -93,12 +93,6 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         if upright.is_some_and(|&change| change < 0.0) { link } else { link.wrapping_neg() }
     }
 
-    /// How far the sensor that answers a jog has to move in the sign check (counts); 0 without a cart.
-    pub(super) fn jog_sign_counts(&self) -> i32 {
-        let signs = &self.table.limits.sign_counts;
-        signs.get(self.table.drive.witness()).copied().unwrap_or_default()
-    }
-
     /// What keeps a drive with pulses from moving the cart to the switches.
     pub(super) fn homing_inhibits(&self) -> Inhibits {
         if self.table.drive.pulses().is_some() { self.input_inhibits() } else { Inhibits::NONE }

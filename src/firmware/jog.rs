@@ -24,7 +24,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let inhibits = self
             .inhibits_before_motor_check()
             .union(Inhibits::HELD.when(!is_released))
-            .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.limits)))
+            .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.sensors)))
             .union(self.off_centre_inhibit(counts, self.table.limits.rail_m));
         let answer = self.answer_to_jog(counts);
         self.supervisor.start_jogging(inhibits)?;
@@ -43,7 +43,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             return self.trip(fault, None);
         }
         let answer = self.answer_to_jog(&counts);
-        match self.jog.update(answer, self.jog_sign_counts(), table.tick_s) {
+        match self.jog.update(answer, table.witness_sign_counts(), table.tick_s) {
             Some(share) => self.output = self.jog_output(share),
             None => self.supervisor.disarm(),
         }

@@ -156,8 +156,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         Self {
             controller,
             supervisor,
-            calibration: Calibration::new(&table.limits),
-            jog: Jog::new(table.limits.sign_counts.get(table.drive.witness()).copied().unwrap_or_default()),
+            calibration: Calibration::new(&table.sensors),
+            jog: Jog::new(table.witness_sign_counts()),
             detection: Detection::of_motor(table.drive.witness()),
             debounce: Debounce::default(),
             checksum_scan: ChecksumScan::default(),
@@ -307,25 +307,23 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn follow(&mut self) -> [i32; NY] {
         self.controller.follow(&self.raw_counts);
         let counts = *self.controller.encoders().counts();
-        self.calibration.update(&counts, &self.table.absolute.still_counts, &self.table.limits);
+        self.calibration.update(&counts, &self.table.sensors);
         counts
     }
 
     /// A tick with the motor off: homing, sign check, and waiting for the links to be upright.
     fn tick_motor_off(&mut self) {
         let counts = self.follow();
-        let limits = &self.table.limits;
+        let GainTable { limits, sensors, tick_s, .. } = self.table;
         // Not while armed, when the same tick may go on with the control law.
-        if let Some(observer) = &self.table.observer
-            && self.supervisor.state() != State::Armed
-        {
-            self.calibration.update_swinging(&counts, &observer.step.data.0[0], limits, self.table.tick_s);
+        if self.table.observer.is_some() && self.supervisor.state() != State::Armed {
+            self.calibration.update_swinging(&counts, sensors, *tick_s);
         }
         self.jog.wait();
         self.rearm_lockout_ticks = self.rearm_lockout_ticks.saturating_sub(1);
         match self.supervisor.state() {
             State::Homing => self.home_by_switches(&counts),
-            State::Calibrated => self.calibration.update_sign_check(&counts, limits),
+            State::Calibrated => self.calibration.update_sign_check(&counts, sensors, limits),
             State::Armed => self.tick_armed(&counts),
             State::Disarmed
             | State::Jogging
@@ -402,10 +400,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     fn trip(&mut self, fault: Fault, sensor: Option<u8>) {
         if self.supervisor.state() != State::Fault {
             if fault.loses_positions() {
-                self.calibration.invalidate(&self.table.limits);
+                self.calibration.invalidate(&self.table.sensors);
             }
             if fault.doubts_motor() {
-                self.jog.forget(self.jog_sign_counts());
+                self.jog.forget(self.table.witness_sign_counts());
             }
         }
         self.calibration.cancel();
@@ -417,7 +415,8 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     /// A tick of homing by the limit switches.
     #[inline(never)]
     fn home_by_switches(&mut self, counts: &[i32; NY]) {
-        let found = self.calibration.update_rail_homing(counts, &self.contacts, &self.table.limits);
+        let GainTable { limits, sensors, .. } = self.table;
+        let found = self.calibration.update_rail_homing(counts, &self.contacts, sensors, limits);
         match found.and_then(|position| Ok((position, self.drive_to_switches(counts)?))) {
             // Tried again in the next tick, until the links hang where their sensors' zeros say.
             Ok((Some(position), true)) => {
@@ -435,10 +434,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
 
     /// Homes with the sensors at `position`, or, if they are absolute, where their own zeros say.
     fn home(&mut self, position: &[i32; NY]) -> Result<(), Inhibits> {
-        let table = self.table;
         self.supervisor.check_homing_allowed()?;
-        let position = table.absolute.positions(position, &self.raw_counts, &table.limits);
-        let position = position.ok_or(Inhibits::OTHER_ZERO)?;
+        let mut position = *position;
+        for ((position, &raw), sensor) in position.iter_mut().zip(&self.raw_counts).zip(&self.table.sensors) {
+            *position = sensor.home_position(*position, raw).ok_or(Inhibits::OTHER_ZERO)?;
+        }
         self.supervisor.complete_homing()?;
         self.controller.encoders_mut().home(&self.raw_counts, &position);
         self.calibration.set_homed();

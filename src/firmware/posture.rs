@@ -17,11 +17,10 @@ const MOVING_PART_OF_ARM_TICKS: u32 = 4;
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
     /// Largest angle of a link from the vertical at these counts (rad); 0 for a rig without joints (a `[model]`).
     pub(super) fn largest_lean(&self, counts: &[i32; NY]) -> f32 {
-        let Some(observer) = &self.table.observer else { return 0.0 };
         let (mut angle, mut largest) = (0.0, 0.0f32);
-        let joints = counts.iter().zip(observer.step.iter()).zip(&self.table.limits.turn_counts);
-        for ((&count, step), _) in joints.filter(|(_, turn)| **turn > 0) {
-            angle += step * count as f32;
+        let joints = counts.iter().zip(&self.table.sensors).filter(|(_, sensor)| sensor.turn_counts > 0);
+        for (&count, sensor) in joints {
+            angle += sensor.step * count as f32;
             // A comparison, because `f32::max` would be a function call in the image.
             if f32::abs(angle) > largest {
                 largest = f32::abs(angle);
@@ -33,11 +32,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// [`Inhibits::OFF_CENTRE`] if the cart is not between `low` and `high` (m) at these counts.
     #[inline(never)]
     pub(super) fn off_centre_inhibit(&self, counts: &[i32; NY], [low, high]: [f32; 2]) -> Inhibits {
-        let step = self
-            .table
-            .observer
-            .as_ref()
-            .map_or(0.0, |observer| observer.step.iter().next().copied().unwrap_or_default());
+        let step = self.table.sensors.first().map_or(0.0, |cart| cart.step);
         let position = step * counts.first().copied().unwrap_or_default() as f32;
         Inhibits::OFF_CENTRE.when(position < low || position > high)
     }
@@ -62,7 +57,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
         let limits = &self.table.limits;
         let counts = *self.controller.encoders().counts();
-        let lean = self.largest_lean(&limits.within_half_a_turn(&counts));
+        let lean = self.largest_lean(&self.table.within_half_a_turn(&counts));
         self.inhibits_with_motor_off()
             .union(Inhibits::TILTED.when(lean > limits.arm_angle_rad))
             .union(self.off_centre_inhibit(&counts, limits.setpoints_m()))

@@ -24,7 +24,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let position_m = self.controller.positions().iter().next().copied().unwrap_or_default();
         let [low, high] = limits.rail_m.map(|end| CENTRE * end);
         // Without a cart there is nothing to shake.
-        let hangs = links_hang(&counts, limits) && self.jog_sign_counts() > 0;
+        let hangs = links_hang(&counts, &self.table.sensors) && self.table.witness_sign_counts() > 0;
         let inhibits = self
             .inhibits_with_motor_off()
             .union(self.held_inhibit(id))
@@ -57,8 +57,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         if let Some(fault) = self.debounce.check_inputs(&table.limits, table.drive.supply_max_v(), inputs) {
             return self.trip(fault, None);
         }
-        let Some(observer) = &table.observer else { return self.supervisor.disarm() };
-        match self.shaker.update(self.tick, &counts, &observer.step, &table.limits, table.tick_s) {
+        match self.shaker.update(self.tick, &counts, &table.sensors, &table.limits, table.tick_s) {
             Ok(Some(force_n)) => {
                 let (drive, applied_n) = self.actuate(force_n);
                 (self.requested_n, self.applied_n) = (force_n, applied_n);

@@ -50,11 +50,10 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
     }
 
     fn raising_inhibits(&self, motion: &MotionTable<'_>) -> Inhibits {
-        let limits = &self.table.limits;
         let counts = self.controller.encoders().counts();
         let position = self.controller.positions().iter().next().copied().unwrap_or_default();
         self.inhibits_with_motor_off()
-            .union(Inhibits::NOT_HANGING.when(!links_hang(counts, limits)))
+            .union(Inhibits::NOT_HANGING.when(!links_hang(counts, &self.table.sensors)))
             .union(Inhibits::NO_ROOM.when(!self.has_room(motion, position)))
             .union(Inhibits::OTHER_LAW.when(self.controller.law() != Law::Lqr))
     }
@@ -63,7 +62,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let setpoint = self.controller.law_state().setpoint;
         let limits = &self.table.limits;
         let lean =
-            self.largest_lean(&limits.from_rest(self.controller.encoders().counts(), self.equilibrium()));
+            self.largest_lean(&self.table.from_rest(self.controller.encoders().counts(), self.equilibrium()));
         let settled = setpoint == self.controller.setpoint() && lean <= limits.arm_angle_rad;
         Inhibits::UNSETTLED.when(!settled).union(Inhibits::NO_ROOM.when(!self.has_room(motion, setpoint)))
     }
@@ -82,7 +81,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         let motion = self.transition(to)?;
         let (from, to) = (self.equilibrium(), to.of_links(NY - 1));
         let inhibits = self.motion_inhibits(motion);
-        let counts = self.table.limits.unwound(self.controller.encoders().counts(), from);
+        let counts = self.table.unwound(self.controller.encoders().counts(), from);
         if let State::Balancing | State::Holding = self.supervisor.state() {
             if to == Equilibrium::hanging(NY - 1) {
                 self.supervisor.lower(inhibits)?;
@@ -144,7 +143,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             self.hold_setpoint();
             if self.supervisor.state() != State::Holding {
                 self.moving = None;
-                let counts = self.table.limits.unwound(self.controller.encoders().counts(), self.goal);
+                let counts = self.table.unwound(self.controller.encoders().counts(), self.goal);
                 self.controller.unwind(&self.raw_counts, &counts);
             }
             self.restart_supervision();

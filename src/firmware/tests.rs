@@ -9,6 +9,7 @@ use crate::control::actuator::Drive;
 use crate::gains::{SENSORS, STATES, TABLE, TICK_S};
 use crate::protocol::message::{Answer, Message, Request, Reset};
 use crate::supervision::inhibits::Inhibits;
+use crate::table::{ReadingMap, SensorKind};
 
 fn firmware<'t>(table: &'t GainTable<STATES, SENSORS>, reset: Reset) -> Firmware<'t, STATES, SENSORS> {
     Firmware::new(table, &NoSwingUp, [CounterWidth::Bits32; SENSORS], reset)
@@ -41,7 +42,7 @@ fn ticks_to_fault(firmware: &mut Firmware<'_, STATES, SENSORS>) -> Option<(u32, 
 fn a_table_that_changes_in_memory_is_found_within_one_pass() {
     let sound = TABLE;
     let mut damaged = TABLE;
-    damaged.limits.sign_counts[2] ^= 1 << 20;
+    damaged.sensors[2].sign_counts ^= 1 << 20;
     assert_eq!(firmware(&damaged, Reset::Power).supervisor.fault(), Some(Fault::Table));
     let mut firmware = firmware(&sound, Reset::Power);
     assert_eq!(ticks_to_fault(&mut firmware), None);
@@ -73,7 +74,7 @@ fn a_reset_by_the_watchdog_starts_disarmed_and_tells_why() {
 fn a_fault_of_motor_or_encoder_puts_the_motors_sign_in_doubt_and_no_other_does() {
     for entry in Fault::ALL {
         let mut firmware = firmware(&TABLE, Reset::Power);
-        let sign_counts = TABLE.limits.sign_counts[0];
+        let sign_counts = TABLE.sensors[0].sign_counts;
         firmware.jog.hold();
         firmware.jog.begin(true, 0);
         assert_eq!(firmware.jog.update(sign_counts, sign_counts, TICK_S), None);
@@ -119,7 +120,7 @@ fn the_cart_is_homed_between_its_switches() {
 fn homing_by_switches_tells_that_a_link_hangs_elsewhere_than_at_its_zero() {
     let homed = |zero_counts: i32| {
         let mut table = TABLE;
-        table.absolute.zero_counts[1] = zero_counts;
+        table.sensors[1].kind = SensorKind::Absolute(ReadingMap { bits: 12, zero_counts });
         table.crc = table.checksum();
         let mut firmware = firmware(&table, Reset::Power);
         let command = Command { id: 1, request: Request::HomeRail };
@@ -134,9 +135,9 @@ fn homing_by_switches_tells_that_a_link_hangs_elsewhere_than_at_its_zero() {
             firmware.finish(None, 0);
         }
         let told = firmware.calibration.homing();
-        let refused = firmware.home(&TABLE.limits.rest_counts);
+        let refused = firmware.home(&TABLE.sensors.map(|sensor| sensor.rest_counts));
         firmware.trip(Fault::EmergencyStop, None);
-        (told, refused, firmware.home(&TABLE.limits.rest_counts))
+        (told, refused, firmware.home(&TABLE.sensors.map(|sensor| sensor.rest_counts)))
     };
     use crate::supervision::homing::Homing;
     // While homing is forbidden, that is the reason, whatever the zeros.

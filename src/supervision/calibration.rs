@@ -6,7 +6,7 @@ use crate::supervision::inhibits::Inhibits;
 use crate::supervision::sign_check::{SignCheck, Signs};
 use crate::supervision::stillness::Stillness;
 use crate::supervision::swinging::Swinging;
-use crate::table::Limits;
+use crate::table::{Limits, SensorRow};
 
 /// Progress of homing and sign check, and how long the rig has been still or slow.
 #[derive(Debug, Clone)]
@@ -22,11 +22,11 @@ pub struct Calibration<const NY: usize> {
 impl<const NY: usize> Calibration<NY> {
     /// Not homed, signs unchecked.
     #[inline(never)]
-    pub fn new(limits: &Limits<NY>) -> Self {
+    pub fn new(sensors: &[SensorRow; NY]) -> Self {
         Self {
             homing: Homing::default(),
             rail: Rail::default(),
-            signs: SignCheck::new(&limits.sign_counts),
+            signs: SignCheck::new(sensors),
             still: Stillness::default(),
             slow: Stillness::default(),
             swinging: Swinging::default(),
@@ -44,26 +44,20 @@ impl<const NY: usize> Calibration<NY> {
     }
 
     /// Back to not homed and unchecked: positions can no longer be trusted.
-    pub fn invalidate(&mut self, limits: &Limits<NY>) {
-        *self = Self::new(limits);
+    pub fn invalidate(&mut self, sensors: &[SensorRow; NY]) {
+        *self = Self::new(sensors);
     }
 
     /// Takes the counts of a tick with the motor off; `still` is the largest motion of each sensor that is still
     /// (counts).
-    pub fn update(&mut self, counts: &[i32; NY], still: &[i32; NY], limits: &Limits<NY>) {
-        self.still.update(counts, still);
-        self.slow.update(counts, &limits.slow_counts);
+    pub fn update(&mut self, counts: &[i32; NY], sensors: &[SensorRow; NY]) {
+        self.still.update(counts, &sensors.each_ref().map(|sensor| sensor.still_counts));
+        self.slow.update(counts, &sensors.each_ref().map(|sensor| sensor.slow_counts));
     }
 
     /// Takes the counts of a tick in which the links may swing out; `steps` is the travel per count (m or rad).
-    pub fn update_swinging(
-        &mut self,
-        counts: &[i32; NY],
-        steps: &[f32; NY],
-        limits: &Limits<NY>,
-        tick_s: f32,
-    ) {
-        self.swinging.update(counts, steps, &limits.turn_counts, tick_s);
+    pub fn update_swinging(&mut self, counts: &[i32; NY], sensors: &[SensorRow; NY], tick_s: f32) {
+        self.swinging.update(counts, sensors, tick_s);
     }
 
     /// Position of each sensor (counts) for homing here: the cart is at 0, and the links hang still or swing about
@@ -71,8 +65,13 @@ impl<const NY: usize> Calibration<NY> {
     ///
     /// # Errors
     /// The inhibits of homing.
-    pub fn hanging(&self, counts: &[i32; NY], limits: &Limits<NY>) -> Result<[i32; NY], Inhibits> {
-        let mut home = limits.rest_counts;
+    pub fn hanging(
+        &self,
+        counts: &[i32; NY],
+        sensors: &[SensorRow; NY],
+        limits: &Limits,
+    ) -> Result<[i32; NY], Inhibits> {
+        let mut home = sensors.each_ref().map(|sensor| sensor.rest_counts);
         match self.swinging.zeros() {
             Ok(zeros) => {
                 for ((home, &count), &zero) in home.iter_mut().zip(counts).zip(zeros) {
@@ -86,11 +85,11 @@ impl<const NY: usize> Calibration<NY> {
     }
 
     /// Whether nothing has moved by more than is still for [`Limits::still_ticks`], as homing requires.
-    pub fn is_still(&self, limits: &Limits<NY>) -> bool {
+    pub fn is_still(&self, limits: &Limits) -> bool {
         self.still.ticks() >= limits.still_ticks
     }
 
-    /// Number of ticks for which no sensor has moved by more than [`Limits::slow_counts`].
+    /// Number of ticks for which no sensor has moved by more than [`SensorRow::slow_counts`].
     pub fn slow_ticks(&self) -> u32 {
         self.slow.ticks()
     }
@@ -127,14 +126,15 @@ impl<const NY: usize> Calibration<NY> {
         &mut self,
         counts: &[i32; NY],
         contacts: &Contacts,
-        limits: &Limits<NY>,
+        sensors: &[SensorRow; NY],
+        limits: &Limits,
     ) -> Result<Option<[i32; NY]>, WrongTravel> {
         let cart = counts.first().copied().unwrap_or_default();
         let found = self.rail.update(cart, contacts, limits.travel_counts, limits.middle_counts);
         self.homing = if found.is_err() { Homing::WrongTravel } else { self.rail.progress() };
         let off_the_switches = !(contacts.limit_low || contacts.limit_high);
         Ok(found?.filter(|_| off_the_switches).and_then(|position| {
-            let mut home = self.hanging(counts, limits).ok()?;
+            let mut home = self.hanging(counts, sensors, limits).ok()?;
             if let Some(cart) = home.first_mut() {
                 *cart = position;
             }
@@ -147,7 +147,7 @@ impl<const NY: usize> Calibration<NY> {
     ///
     /// # Errors
     /// [`WrongTravel`] if a switch is not where it should be; homing ends.
-    pub fn homing_way(&mut self, cart: i32, limits: &Limits<NY>) -> Result<(i32, Option<i32>), WrongTravel> {
+    pub fn homing_way(&mut self, cart: i32, limits: &Limits) -> Result<(i32, Option<i32>), WrongTravel> {
         let way = self.rail.way(cart, limits.travel_counts, limits.middle_counts);
         if way.is_err() {
             self.homing = Homing::WrongTravel;
@@ -172,24 +172,18 @@ impl<const NY: usize> Calibration<NY> {
     }
 
     /// Starts the sign check.
-    pub fn start_sign_check(&mut self, limits: &Limits<NY>) {
-        self.signs.start(&limits.sign_counts);
+    pub fn start_sign_check(&mut self, sensors: &[SensorRow; NY]) {
+        self.signs.start(sensors);
     }
 
     /// One tick of the sign check.
-    pub fn update_sign_check(&mut self, counts: &[i32; NY], limits: &Limits<NY>) {
-        let at_rest = self.is_still(limits) && links_hang(counts, limits);
-        self.signs.update(counts, at_rest, &limits.sign_counts);
+    pub fn update_sign_check(&mut self, counts: &[i32; NY], sensors: &[SensorRow; NY], limits: &Limits) {
+        let at_rest = self.is_still(limits) && links_hang(counts, sensors);
+        self.signs.update(counts, at_rest, sensors);
     }
 }
 
-/// Whether all links hang at rest, to within half of [`Limits::sign_counts`].
-pub fn links_hang<const NY: usize>(counts: &[i32; NY], limits: &Limits<NY>) -> bool {
-    let mut from_rest = *counts;
-    for (count, &rest) in from_rest.iter_mut().zip(&limits.rest_counts) {
-        *count = count.wrapping_sub(rest);
-    }
-    let from_rest = limits.within_half_a_turn(&from_rest);
-    let links = from_rest.iter().zip(&limits.sign_counts).skip(1);
-    links.into_iter().all(|(moved, &enough)| enough == 0 || moved.unsigned_abs() <= enough.unsigned_abs() / 2)
+/// Whether all links hang at rest, to within half of [`SensorRow::sign_counts`].
+pub fn links_hang<const NY: usize>(counts: &[i32; NY], sensors: &[SensorRow; NY]) -> bool {
+    counts.iter().zip(sensors).skip(1).all(|(&count, sensor)| sensor.hangs(count))
 }

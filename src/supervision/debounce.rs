@@ -32,7 +32,7 @@ impl Debounce {
     #[inline]
     pub fn check_inputs<const NY: usize>(
         &mut self,
-        limits: &Limits<NY>,
+        limits: &Limits,
         supply_max_v: f32,
         inputs: &Inputs<NY>,
     ) -> Option<Fault> {
@@ -51,7 +51,7 @@ impl Debounce {
     #[cold]
     fn check_bad_inputs<const NY: usize>(
         &mut self,
-        limits: &Limits<NY>,
+        limits: &Limits,
         supply_max_v: f32,
         inputs: &Inputs<NY>,
     ) -> Option<Fault> {
@@ -74,7 +74,7 @@ impl Debounce {
 
     /// Checks the force of a tick; `limited` says that the force applied is not the one requested.
     #[inline]
-    pub fn check_force<const NY: usize>(&mut self, limits: &Limits<NY>, limited: bool) -> Option<Fault> {
+    pub fn check_force(&mut self, limits: &Limits, limited: bool) -> Option<Fault> {
         count(&mut self.saturated, limited);
         (self.saturated > limits.saturated_ticks).then_some(Fault::Saturated)
     }
@@ -82,12 +82,7 @@ impl Debounce {
     /// Checks the link at the end of a tick: whether a command was received, and whether the host commands the
     /// set-point.
     #[inline]
-    pub fn check_link<const NY: usize>(
-        &mut self,
-        limits: &Limits<NY>,
-        received: bool,
-        setpoint_commanded: bool,
-    ) -> Option<Fault> {
+    pub fn check_link(&mut self, limits: &Limits, received: bool, setpoint_commanded: bool) -> Option<Fault> {
         count(&mut self.link_silent, !received);
         (setpoint_commanded && self.link_silent >= limits.link_ticks).then_some(Fault::LinkLost)
     }
@@ -101,7 +96,7 @@ fn count(ticks: &mut u32, holds: bool) {
 mod tests {
     use super::*;
 
-    const LIMITS: Limits<1> =
+    const LIMITS: Limits =
         Limits { supply_min_v: 9.0, supply_ticks: 4, saturated_ticks: 5, link_ticks: 6, ..Limits::none() };
     const GOOD: Inputs<1> = Inputs {
         raw_counts: [0],

@@ -11,7 +11,7 @@ use crate::table::{Limits, MotionLimits};
 /// link's angle from the vertical. `x` is the corrected estimate: a single bad measurement was rejected before and
 /// does not count.
 #[inline]
-pub fn exceeded<const NY: usize>(limits: &Limits<NY>, x: &[f32], requested_n: f32) -> Option<Fault> {
+pub fn exceeded(limits: &Limits, x: &[f32], requested_n: f32) -> Option<Fault> {
     // The request is a sum over all states: if one of them is not finite, neither is the sum.
     if !requested_n.is_finite() {
         return Some(Fault::NotFinite);
@@ -84,8 +84,7 @@ mod tests {
 
     #[test]
     fn every_limit_is_watched_on_both_sides() {
-        let limits =
-            Limits::<3> { rail_m: [-1.0, 2.0], angle_rad: 0.3, speed_m_per_s: 1.5, ..Limits::none() };
+        let limits = Limits { rail_m: [-1.0, 2.0], angle_rad: 0.3, speed_m_per_s: 1.5, ..Limits::none() };
         let found = |x: [f32; 6]| exceeded(&limits, &x, 0.0);
         assert_eq!(found([1.9, -1.4, 0.2, 9.0, -0.45, -9.0]), None);
         assert_eq!(found([2.1, 0.0, 0.0, 0.0, 0.0, 0.0]), Some(Fault::Rail));

@@ -7,13 +7,12 @@
 //!
 //! For a drive with pulses, accelerations of the cart (m/s²) take the place of all these forces.
 
-use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use crate::control::state_feedback::saturate;
 use crate::supervision::fault::Fault;
 use crate::supervision::jog::SILENCE_S;
-use crate::table::Limits;
+use crate::table::{Limits, SensorRow};
 
 /// Number of forces in a command.
 pub const FORCES: usize = 10;
@@ -137,7 +136,7 @@ impl<const NY: usize> Shaker<NY> {
         self.speed_m_per_s
     }
 
-    /// Tick `now`, with the sensors at `counts`; `step` is the travel per count (m or rad). Returns the force (N, or
+    /// Tick `now`, with the sensors at `counts`. Returns the force (N, or
     /// m/s²), or `None` when the shaking has ended.
     ///
     /// # Errors
@@ -146,11 +145,11 @@ impl<const NY: usize> Shaker<NY> {
         &mut self,
         now: u32,
         counts: &[i32; NY],
-        step: &SVector<f32, NY>,
-        limits: &Limits<NY>,
+        sensors: &[SensorRow; NY],
+        limits: &Limits,
         tick_s: f32,
     ) -> Result<Option<f32>, Found> {
-        let position_m = self.measure(counts, step, limits, tick_s)?;
+        let position_m = self.measure(counts, sensors, limits, tick_s)?;
         self.moves(counts, limits.jog_force_n, tick_s)?;
         self.ticks = self.ticks.saturating_add(1);
         self.silent_ticks = self.silent_ticks.saturating_add(1);
@@ -183,14 +182,15 @@ impl<const NY: usize> Shaker<NY> {
     fn measure(
         &mut self,
         counts: &[i32; NY],
-        step: &SVector<f32, NY>,
-        limits: &Limits<NY>,
+        sensors: &[SensorRow; NY],
+        limits: &Limits,
         tick_s: f32,
     ) -> Result<f32, Found> {
         let before = core::mem::replace(&mut self.last, *counts);
         let (mut position_m, mut angle) = (0.0, 0.0);
-        let sensors = counts.iter().zip(step.iter()).zip(before.iter().zip(&self.start));
-        for (sensor, ((&count, &step), (&before, &start))) in (0..).zip(sensors) {
+        let counts = counts.iter().zip(before.iter().zip(&self.start));
+        for (sensor, (row, (&count, (&before, &start)))) in (0..).zip(sensors.iter().zip(counts)) {
+            let step = row.step;
             let rate = step * count.wrapping_sub(before) as f32 / tick_s;
             let most = if sensor == 0 { RATE_OF_SPEED * limits.speed_m_per_s } else { RATE_RAD_PER_S };
             if f32::abs(rate) > most {
@@ -250,12 +250,15 @@ mod tests {
         fed_ticks: u32,
     }
 
+    fn sensors() -> [SensorRow; 3] {
+        STEP.map(|step| SensorRow { step, ..SensorRow::default() })
+    }
+
     type Outcome = Result<Option<f32>, Found>;
 
     /// Result of such a run: the ticks with the motor on, the largest force, and how it ended.
     fn run(run: &Run) -> (u32, f32, Outcome) {
-        let limits =
-            Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, jog_force_n: 1.0, ..Limits::none() };
+        let limits = Limits { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, jog_force_n: 1.0, ..Limits::none() };
         let mut shaker = Shaker::default();
         shaker.begin(SHAKING, &(run.counts)(0));
         let mut most = 0.0f32;
@@ -263,7 +266,7 @@ mod tests {
             if tick < run.fed_ticks && tick.is_multiple_of(10) {
                 shaker.take(tick, (tick + 1) as u16, &[FULL; FORCES]);
             }
-            match shaker.update(tick, &(run.counts)(tick as i32), &STEP.into(), &limits, TICK_S) {
+            match shaker.update(tick, &(run.counts)(tick as i32), &sensors(), &limits, TICK_S) {
                 Ok(Some(force)) => most = most.max(force.abs()),
                 ended => return (tick, most, ended),
             }
@@ -279,13 +282,12 @@ mod tests {
 
     #[test]
     fn the_force_is_bounded_and_rises_slowly() {
-        let limits =
-            Limits::<3> { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, jog_force_n: 1.0, ..Limits::none() };
+        let limits = Limits { rail_m: [-1.0, 1.0], speed_m_per_s: 2.0, jog_force_n: 1.0, ..Limits::none() };
         let mut shaker = Shaker::default();
         shaker.begin(SHAKING, &[0; 3]);
         shaker.take(0, 0, &[FULL; FORCES]);
         let mut forces = (0..12u32)
-            .map(|tick| shaker.update(tick, &[0; 3], &STEP.into(), &limits, TICK_S).unwrap().unwrap());
+            .map(|tick| shaker.update(tick, &[0; 3], &sensors(), &limits, TICK_S).unwrap().unwrap());
         // The force of the present tick comes too late.
         assert_eq!(forces.next(), Some(0.0));
         let rising: std::vec::Vec<f32> = forces.collect();

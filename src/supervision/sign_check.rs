@@ -2,12 +2,14 @@
 //!
 //! A person turns the links counter-clockwise one by one, from the outermost inwards, and then pushes the cart along
 //! +x. Each step starts with the links hanging at rest and lasts until a sensor has moved by its
-//! [`sign_counts`](crate::table::Limits::sign_counts). The requested sensor has to be the first to do so, among itself
-//! and all sensors further inwards, and in the positive direction. (Links further out keep hanging and so turn
+//! [`sign_counts`](crate::table::SensorRow::sign_counts). The requested sensor has to be the first to do so, among
+//! itself and all sensors further inwards, and in the positive direction. (Links further out keep hanging and so turn
 //! backwards against the one being turned; they were checked before.) A reversed encoder moves in the negative
 //! direction; of two swapped encoders, the inner one moves instead of the outer one.
 
 use serde::{Deserialize, Serialize};
+
+use crate::table::SensorRow;
 
 /// Progress of the sign check; sensors are numbered (0: cart, 1: first link …).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -40,9 +42,9 @@ pub struct SignCheck<const NY: usize> {
 }
 
 impl<const NY: usize> SignCheck<NY> {
-    /// Unchecked, or already checked if `sign_counts` leave nothing to check.
-    pub fn new(sign_counts: &[i32; NY]) -> Self {
-        let signs = last_to_check(sign_counts, NY).map_or(Signs::Checked, |_| Signs::Unchecked);
+    /// Unchecked, or already checked if these sensors leave nothing to check.
+    pub fn new(sensors: &[SensorRow; NY]) -> Self {
+        let signs = last_to_check(sensors, NY).map_or(Signs::Checked, |_| Signs::Unchecked);
         Self { signs, start_counts: [0; NY] }
     }
 
@@ -52,8 +54,8 @@ impl<const NY: usize> SignCheck<NY> {
     }
 
     /// Starts with the outermost link.
-    pub fn start(&mut self, sign_counts: &[i32; NY]) {
-        self.signs = last_to_check(sign_counts, NY).map_or(Signs::Checked, Signs::Rest);
+    pub fn start(&mut self, sensors: &[SensorRow; NY]) {
+        self.signs = last_to_check(sensors, NY).map_or(Signs::Checked, Signs::Rest);
     }
 
     /// Cancels a check in progress; a finished one stays.
@@ -65,18 +67,18 @@ impl<const NY: usize> SignCheck<NY> {
 
     /// Takes the counts of a tick, and whether the links hang at rest.
     #[inline(never)]
-    pub fn update(&mut self, counts: &[i32; NY], at_rest: bool, sign_counts: &[i32; NY]) {
+    pub fn update(&mut self, counts: &[i32; NY], at_rest: bool, rows: &[SensorRow; NY]) {
         match self.signs {
             Signs::Rest(next) if at_rest => (self.signs, self.start_counts) = (Signs::Move(next), *counts),
-            Signs::Move(asked) => self.update_move(asked, counts, sign_counts),
+            Signs::Move(asked) => self.update_move(asked, counts, rows),
             _ => {}
         }
     }
 
-    fn update_move(&mut self, asked: u8, counts: &[i32; NY], sign_counts: &[i32; NY]) {
-        let sensors = counts.iter().zip(&self.start_counts).zip(sign_counts).zip(0..=asked);
-        let far =
-            sensors.map(|(((count, from), &enough), sensor)| (count.wrapping_sub(*from), enough, sensor));
+    fn update_move(&mut self, asked: u8, counts: &[i32; NY], rows: &[SensorRow; NY]) {
+        let sensors = counts.iter().zip(&self.start_counts).zip(rows).zip(0..=asked);
+        let far = sensors
+            .map(|(((count, from), row), sensor)| (count.wrapping_sub(*from), row.sign_counts, sensor));
         let mut far =
             far.filter(|&(moved, enough, _)| enough > 0 && moved.unsigned_abs() >= enough.unsigned_abs());
         let Some((moved, _, sensor)) = far.next() else { return };
@@ -85,28 +87,31 @@ impl<const NY: usize> SignCheck<NY> {
         } else if moved < 0 {
             Signs::Reversed(asked)
         } else {
-            last_to_check(sign_counts, usize::from(asked)).map_or(Signs::Checked, Signs::Rest)
+            last_to_check(rows, usize::from(asked)).map_or(Signs::Checked, Signs::Rest)
         };
     }
 }
 
 /// The last sensor before `end` that has a sign to check.
 #[inline(never)]
-fn last_to_check<const NY: usize>(sign_counts: &[i32; NY], end: usize) -> Option<u8> {
-    let sensors = sign_counts.iter().take(end).zip(0u8..);
-    sensors.filter(|(counts, _)| **counts > 0).map(|(_, sensor)| sensor).last()
+fn last_to_check<const NY: usize>(rows: &[SensorRow; NY], end: usize) -> Option<u8> {
+    let sensors = rows.iter().take(end).zip(0u8..);
+    sensors.filter(|(row, _)| row.sign_counts > 0).map(|(_, sensor)| sensor).last()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const ENOUGH: [i32; 3] = [50, 130, 130];
+    fn sensors<const NY: usize>(enough: [i32; NY]) -> [SensorRow; NY] {
+        enough.map(|sign_counts| SensorRow { sign_counts, ..SensorRow::default() })
+    }
 
     /// Result when a person moves each requested sensor; `wire` turns true counts into those that the firmware reads.
     fn check(wire: impl Fn([i32; 3]) -> [i32; 3]) -> Signs {
-        let mut check = SignCheck::new(&ENOUGH);
-        check.start(&ENOUGH);
+        let enough = sensors([50, 130, 130]);
+        let mut check = SignCheck::new(&enough);
+        check.start(&enough);
         for tick in 0.. {
             let moved = 1 + tick % 200;
             let counts = match check.signs() {
@@ -118,7 +123,7 @@ mod tests {
                 Signs::Move(0) => [moved, 2 * moved, -2 * moved],
                 end => return end,
             };
-            check.update(&wire(counts), counts == [0, 0, 0], &ENOUGH);
+            check.update(&wire(counts), counts == [0, 0, 0], &enough);
             assert!(tick < 10_000);
         }
         Signs::Unchecked
@@ -147,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_rig_with_nothing_to_check_is_checked() {
-        assert_eq!(SignCheck::new(&[0, 0]).signs(), Signs::Checked);
-        assert_eq!(SignCheck::new(&ENOUGH).signs(), Signs::Unchecked);
+        assert_eq!(SignCheck::new(&sensors([0, 0])).signs(), Signs::Checked);
+        assert_eq!(SignCheck::new(&sensors([50, 130, 130])).signs(), Signs::Unchecked);
     }
 }

@@ -6,6 +6,7 @@
 //! has swung to both sides by [`SWING`], and those of two windows in a row differ by no more than [`TOLERANCE`].
 
 use crate::supervision::inhibits::Inhibits;
+use crate::table::SensorRow;
 
 /// Length of a window (s).
 pub const WINDOW_S: f32 = 5.0;
@@ -59,9 +60,8 @@ impl<const NY: usize> Default for Swinging<NY> {
 }
 
 impl<const NY: usize> Swinging<NY> {
-    /// Takes the counts of a tick. `steps` is the travel per count (m or rad), `turn_counts` a whole turn of each
-    /// joint, 0 for the cart.
-    pub fn update(&mut self, counts: &[i32; NY], steps: &[f32; NY], turn_counts: &[i32; NY], tick_s: f32) {
+    /// Takes the counts of a tick.
+    pub fn update(&mut self, counts: &[i32; NY], sensors: &[SensorRow; NY], tick_s: f32) {
         let part = tick_s / WINDOW_S;
         let weight = self.time - self.time * self.time;
         // 1/30 is the mean of this square over the window.
@@ -71,8 +71,8 @@ impl<const NY: usize> Swinging<NY> {
         let (mut joints, mut agrees) = (0, true);
         for sensor in 0..NY {
             let away = counts[sensor] as f32 - self.mean[sensor];
-            let is_far = f32::abs(away * steps[sensor]) > SWING;
-            if turn_counts[sensor] == 0 {
+            let is_far = f32::abs(away * sensors[sensor].step) > SWING;
+            if sensors[sensor].turn_counts == 0 {
                 self.is_near = !is_far;
             } else {
                 let side = 1 << (2 * sensor % 32);
@@ -83,7 +83,7 @@ impl<const NY: usize> Swinging<NY> {
             }
             self.moved[sensor] += weight * away;
             if ends {
-                agrees &= f32::abs(self.moved[sensor] * steps[sensor]) <= TOLERANCE;
+                agrees &= f32::abs(self.moved[sensor] * sensors[sensor].step) <= TOLERANCE;
                 self.mean[sensor] += core::mem::take(&mut self.moved[sensor]);
             }
         }
@@ -122,7 +122,11 @@ mod tests {
     use super::*;
 
     const TICK_S: f32 = 0.002;
-    const STEPS: [f32; 2] = [1e-4, 1e-3];
+    /// A cart and a joint.
+    fn sensors() -> [SensorRow; 2] {
+        let of = |step, turn_counts| SensorRow { step, turn_counts, ..SensorRow::default() };
+        [of(1e-4, 0), of(1e-3, 6283)]
+    }
 
     /// What is known after `time_s` of a cart at `cart` and a joint that swings at 7 rad/s; both are functions of time,
     /// and give the cart's position, and amplitude and mean of the joint (counts).
@@ -137,7 +141,7 @@ mod tests {
             let [amplitude, mean] = joint(t);
             let angle = mean + amplitude * libm::cosf(7.0 * t + 1.0);
             let counts = [libm::roundf(cart(t)) as i32, libm::roundf(angle) as i32];
-            swinging.update(&counts, &STEPS, &[0, 6283], TICK_S);
+            swinging.update(&counts, &sensors(), TICK_S);
         }
         swinging.zeros().copied()
     }
@@ -170,7 +174,7 @@ mod tests {
         let mut swing_for = |ticks: u32, zero: i32| {
             for tick in 0..ticks {
                 let angle = zero as f32 + 50.0 * libm::cosf(7.0 * TICK_S * tick as f32);
-                swinging.update(&[0, libm::roundf(angle) as i32], &STEPS, &[0, 6283], TICK_S);
+                swinging.update(&[0, libm::roundf(angle) as i32], &sensors(), TICK_S);
             }
             let zeros = swinging.zeros().map(|zeros| libm::roundf(zeros[1]));
             swinging.forget();

@@ -1,9 +1,9 @@
 //! The gain table of a rig, and its check.
 
 use crate::numbers::Scalar;
-use crate::table::absolute::AbsoluteZeros;
 use crate::table::checksum;
 use crate::table::drive::DriveMap;
+use crate::table::equilibrium::Equilibrium;
 use crate::table::error::TableError;
 use crate::table::format::TABLE_FORMAT;
 use crate::table::friction::FrictionMap;
@@ -11,6 +11,7 @@ use crate::table::law::{Law, LawGains, PerLaw};
 use crate::table::limits::Limits;
 use crate::table::observer::ObserverGains;
 use crate::table::part::{is_finite, part};
+use crate::table::sensor::SensorRow;
 use crate::table::thresholds::Thresholds;
 
 part! {
@@ -20,16 +21,16 @@ part! {
     pub struct GainTable<NX to MX, NY to MY; T> {
         /// Layout of the table: `TABLE_FORMAT` of the writer.
         pub format: u32,
-        /// Number of states; equal to `NX` in a sound table.
-        pub states: u32,
-        /// Number of sensors; equal to `NY` in a sound table.
-        pub sensors: u32,
+        /// Numbers of states and sensors; equal to `NX` and `NY` in a sound table.
+        pub dimensions: [u32; 2],
         /// Index of the state that follows the set-point.
         pub output: u32,
         /// Hash of the rig file's values.
         pub rig_hash: u64,
         /// Control period (s).
         pub tick_s: T,
+        /// The sensors; the first one is the cart's.
+        pub sensors: [SensorRow<T>; NY],
         /// The drive of the cart.
         pub drive: DriveMap<T>,
         /// Gains of the control laws that are designed, at least one.
@@ -39,11 +40,9 @@ part! {
         /// Known Coulomb friction, if there is any: it is compensated.
         pub friction: Option<FrictionMap<NX, NY, T>>,
         /// Limits that the supervisor enforces.
-        pub limits: Limits<NY>,
+        pub limits: Limits,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault.
         pub thresholds: Thresholds<NY>,
-        /// Absolute sensors.
-        pub absolute: AbsoluteZeros<NY>,
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above, see [`GainTable::checksum`].
         pub crc,
@@ -56,6 +55,41 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         checksum::checksum(self)
     }
 
+    /// How far the sensor that shows what the motor does has to be moved when its sign is checked (counts); 0 without a
+    /// cart.
+    pub fn witness_sign_counts(&self) -> i32 {
+        self.sensors.get(self.drive.witness()).map_or(0, |sensor| sensor.sign_counts)
+    }
+
+    /// `counts` with whole turns removed from each joint, so that it is within half a turn of 0.
+    pub fn within_half_a_turn(&self, counts: &[i32; NY]) -> [i32; NY] {
+        let mut wrapped = *counts;
+        wrapped
+            .iter_mut()
+            .zip(&self.sensors)
+            .for_each(|(count, sensor)| *count = sensor.within_half_a_turn(*count));
+        wrapped
+    }
+
+    /// Distance of these counts from rest `at` an equilibrium, without whole turns of the joints.
+    pub fn from_rest(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
+        let mut away = *counts;
+        for (number, (count, sensor)) in away.iter_mut().zip(&self.sensors).enumerate() {
+            *count = sensor.within_half_a_turn(count.wrapping_sub(sensor.at_rest(number, at)));
+        }
+        away
+    }
+
+    /// These counts without whole turns of the joints, so that each is within half a turn of where it rests `at` an
+    /// equilibrium.
+    pub fn unwound(&self, counts: &[i32; NY], at: Equilibrium) -> [i32; NY] {
+        let mut unwound = self.from_rest(counts, at);
+        for (number, (count, sensor)) in unwound.iter_mut().zip(&self.sensors).enumerate() {
+            *count = count.wrapping_add(sensor.at_rest(number, at));
+        }
+        unwound
+    }
+
     /// Checks that the table is intact, plausible and of this version.
     ///
     /// # Errors
@@ -64,7 +98,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if self.format != TABLE_FORMAT {
             return Err(TableError::Format);
         }
-        if self.states as usize != NX || self.sensors as usize != NY {
+        if self.dimensions.map(|number| number as usize) != [NX, NY] {
             return Err(TableError::Dimensions);
         }
         if self.crc != self.checksum() {
@@ -73,8 +107,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
         if !self.drive.late().is_sound() {
             return Err(TableError::Delay);
         }
-        let mut measured = self.observer.iter().flat_map(|observer| &observer.measured);
-        if self.output as usize >= NX || measured.any(|&state| state as usize >= NX) {
+        if self.output as usize >= NX || self.sensors.iter().any(|sensor| sensor.state as usize >= NX) {
             return Err(TableError::Dimensions);
         }
         if self.laws.present().next().is_none() {
@@ -84,10 +117,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && self.laws.present().all(|(_, law)| law.is_sound())
             && self.limits.is_sound()
             && self.thresholds.is_sound()
-            && self
-                .observer
-                .iter()
-                .all(|observer| observer.delay_s.data.0[0].iter().all(|&delay_s| delay_s >= 0.0));
+            && self.sensors.iter().all(SensorRow::is_sound);
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }
 }

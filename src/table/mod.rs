@@ -16,7 +16,6 @@
 //! # Ok::<(), TableError>(())
 //! ```
 
-mod absolute;
 mod chain_model;
 pub mod checksum;
 mod columns;
@@ -32,12 +31,12 @@ mod limits;
 mod motor;
 mod observer;
 mod part;
+mod sensor;
 mod steps;
 mod swing_up;
 mod thresholds;
 
 pub use crate::numbers::{Number, Scalar};
-pub use absolute::AbsoluteZeros;
 pub use chain_model::ChainModel;
 pub use checksum::ChecksumScan;
 pub use columns::columns;
@@ -55,6 +54,7 @@ pub use observer::ObserverGains;
 #[cfg(test)]
 pub(crate) use part::WordsMut;
 pub use part::{Part, Reader, Resize, Shape, Variant, Words};
+pub use sensor::{ReadingMap, SensorKind, SensorRow};
 pub use steps::StepMap;
 pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
 pub use thresholds::{MotorTest, Thresholds};

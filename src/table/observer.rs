@@ -14,11 +14,5 @@ part! {
         pub bd: SVector<T, NX>,
         /// L of `x̂ = x̂⁻ + L e`: a column for each sensor, a row for each state.
         pub l: SMatrix<T, NX, NY>,
-        /// Index of the state that each sensor measures.
-        pub measured: [u32; NY],
-        /// Travel per count of each sensor (m or rad).
-        pub step: SVector<T, NY>,
-        /// Age of each sensor's reading (s): it shows its state as it was, less the next state, the rate, by this time.
-        pub delay_s: SVector<T, NY>,
     }
 }

@@ -115,6 +115,56 @@ pub trait Part {
 
     /// Passes all names, documentation and values to `reader`, in the order of declaration.
     fn read(&self, reader: &mut dyn Reader);
+
+    /// [`part`](Self::part) of an array: numbers are one leaf together, others follow one after the other.
+    fn part_of_list<'l>(list: &'l [Self], at: &mut usize) -> Option<Words<'l>>
+    where
+        Self: Sized,
+    {
+        list.iter().find_map(|part| part.part(at))
+    }
+
+    /// The same, mutable.
+    #[cfg(test)]
+    fn part_of_list_mut<'l>(list: &'l mut [Self], at: &mut usize) -> Option<WordsMut<'l>>
+    where
+        Self: Sized,
+    {
+        list.iter_mut().find_map(|part| part.part_mut(at))
+    }
+
+    /// [`read`](Self::read) of an array.
+    fn read_list(list: &[Self], reader: &mut dyn Reader)
+    where
+        Self: Sized,
+    {
+        reader.list(list.len(), Shape::List);
+        list.iter().for_each(|part| part.read(reader));
+    }
+}
+
+impl<P: Part, const N: usize> Part for [P; N] {
+    #[inline]
+    fn part(&self, at: &mut usize) -> Option<Words<'_>> {
+        P::part_of_list(self, at)
+    }
+
+    #[cfg(test)]
+    fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
+        P::part_of_list_mut(self, at)
+    }
+
+    fn read(&self, reader: &mut dyn Reader) {
+        P::read_list(self, reader);
+    }
+}
+
+impl<P: Copy + Default, const N: usize, const M: usize> Resize<[P; M]> for [P; N] {
+    fn resized(&self) -> [P; M] {
+        let mut resized = [P::default(); M];
+        copy(self, &mut resized);
+        resized
+    }
 }
 
 /// Receives the fields of a table with names, documentation and values.
@@ -131,8 +181,8 @@ pub trait Reader {
     /// The value of a field is this variant. If it has a value, that follows.
     fn variant(&mut self, variant: Variant);
 
-    /// The value of a field is a list of `length` structs, which follow.
-    fn list(&mut self, length: usize);
+    /// The value of a field is a list of `length` structs, which follow: an array, or a slice.
+    fn list(&mut self, length: usize, shape: Shape);
 
     /// End of the struct.
     fn end(&mut self);
@@ -160,35 +210,25 @@ macro_rules! words {
             fn read(&self, reader: &mut dyn Reader) {
                 reader.words(Words::$kind(core::slice::from_ref(self)), Shape::Value);
             }
+
+            #[inline]
+            fn part_of_list<'l>(list: &'l [Self], at: &mut usize) -> Option<Words<'l>> {
+                leaf(at, Words::$kind(list))
+            }
+
+            #[cfg(test)]
+            fn part_of_list_mut<'l>(list: &'l mut [Self], at: &mut usize) -> Option<WordsMut<'l>> {
+                leaf(at, WordsMut::$kind(list))
+            }
+
+            fn read_list(list: &[Self], reader: &mut dyn Reader) {
+                reader.words(Words::$kind(list), Shape::List);
+            }
         }
 
         impl Resize<$type> for $type {
             fn resized(&self) -> Self {
                 *self
-            }
-        }
-
-        impl<const N: usize> Part for [$type; N] {
-            #[inline]
-            fn part(&self, at: &mut usize) -> Option<Words<'_>> {
-                leaf(at, Words::$kind(self))
-            }
-
-            #[cfg(test)]
-            fn part_mut(&mut self, at: &mut usize) -> Option<WordsMut<'_>> {
-                leaf(at, WordsMut::$kind(self))
-            }
-
-            fn read(&self, reader: &mut dyn Reader) {
-                reader.words(Words::$kind(self), Shape::List);
-            }
-        }
-
-        impl<const N: usize, const M: usize> Resize<[$type; M]> for [$type; N] {
-            fn resized(&self) -> [$type; M] {
-                let mut resized = [<$type>::default(); M];
-                copy(self, &mut resized);
-                resized
             }
         }
     };

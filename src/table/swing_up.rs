@@ -12,7 +12,7 @@ use crate::table::format::TABLE_FORMAT;
 use crate::table::gain_table::GainTable;
 #[cfg(test)]
 use crate::table::part::WordsMut;
-use crate::table::part::{Part, Reader, Resize, Words, is_finite, part};
+use crate::table::part::{Part, Reader, Resize, Shape, Words, is_finite, part};
 use crate::table::thresholds::Thresholds;
 
 part! {
@@ -62,7 +62,7 @@ impl Part for &[TransitionTable<'_>] {
     }
 
     fn read(&self, reader: &mut dyn Reader) {
-        reader.list(self.len());
+        reader.list(self.len(), Shape::Slice);
         self.iter().for_each(|transition| transition.read(reader));
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::*;
 
-const LIMITS: Limits<2> = Limits {
+const LIMITS: Limits = Limits {
     rail_m: [-1.0, 1.0],
     angle_rad: 0.35,
     speed_m_per_s: 2.0,
@@ -22,10 +22,6 @@ const LIMITS: Limits<2> = Limits {
     still_ticks: 6,
     travel_counts: [2000, 20],
     middle_counts: 7,
-    slow_counts: [8, 9],
-    rest_counts: [0, 2048],
-    turn_counts: [0, 4096],
-    sign_counts: [50, 130],
 };
 
 const THRESHOLDS: Thresholds<2> = Thresholds {
@@ -34,6 +30,23 @@ const THRESHOLDS: Thresholds<2> = Thresholds {
     push: [0.5, 0.6],
     motor: MotorTest { a: [1.0, 2.0, 3.0, 4.0], b: [5.0, 6.0], ratio: 0.5, energy: 7.0 },
 };
+
+/// The cart's sensor and a link's, an absolute one.
+fn sensors(next: &mut impl FnMut() -> f32) -> [SensorRow; 2] {
+    let kinds = [SensorKind::Counter, SensorKind::Absolute(ReadingMap { bits: 12, zero_counts: 17 })];
+    let row = |sensor: usize| SensorRow {
+        state: 2 * sensor as u32,
+        kind: kinds[sensor],
+        step: next(),
+        delay_s: next(),
+        turn_counts: [0, 4096][sensor],
+        rest_counts: [0, 2048][sensor],
+        sign_counts: [50, 130][sensor],
+        slow_counts: [8, 9][sensor],
+        still_counts: [1, 3][sensor],
+    };
+    core::array::from_fn(row)
+}
 
 /// A table with every optional part, all numbers different.
 fn full() -> GainTable<4, 2> {
@@ -53,11 +66,11 @@ fn full() -> GainTable<4, 2> {
     });
     let mut table = GainTable {
         format: TABLE_FORMAT,
-        states: 4,
-        sensors: 2,
+        dimensions: [4, 2],
         output: 0,
         rig_hash: 0x0123_4567_89ab_cdef,
         tick_s: 0.01,
+        sensors: sensors(&mut next),
         drive: DriveMap::Volts(MotorMap {
             force: ForceMap { limit_n: next(), late: Late { acts: 0.75, stays: 0.5 } },
             volts_per_newton: next(),
@@ -71,9 +84,6 @@ fn full() -> GainTable<4, 2> {
             ad: SMatrix::from_fn(|_, _| next()),
             bd: SVector::from_fn(|_, _| next()),
             l: SMatrix::from_fn(|_, _| next()),
-            measured: [0, 2],
-            delay_s: SVector::from_fn(|_, _| next()),
-            step: SVector::from_fn(|_, _| next()),
         }),
         friction: Some(FrictionMap {
             axes: SMatrix::from_fn(|_, _| next()),
@@ -81,7 +91,6 @@ fn full() -> GainTable<4, 2> {
         }),
         limits: LIMITS,
         thresholds: THRESHOLDS,
-        absolute: AbsoluteZeros { zero_counts: [-1, 17], still_counts: [1, 3] },
         crc: 0,
     };
     table.crc = table.checksum();
@@ -129,7 +138,7 @@ fn every_flipped_bit_of_a_full_table_is_refused() {
             flip(&mut damaged, leaf, word, bit);
             let expected = match leaf {
                 0 => TableError::Format,
-                1 | 2 => TableError::Dimensions,
+                1 => TableError::Dimensions,
                 _ => TableError::Crc,
             };
             assert_eq!(damaged.check(), Err(expected), "leaf {leaf}, word {word}, bit {bit}");
@@ -158,6 +167,8 @@ fn a_part_that_is_missing_or_moved_to_the_other_law_is_refused() {
     let of_motor = |drive: &DriveMap| *drive.force().unwrap();
     assert_eq!(refused(&|t| t.drive = DriveMap::Force(of_motor(&t.drive))), crc);
     assert_eq!(refused(&|t| t.drive = DriveMap::Pulses(StepMap::ideal(t.tick_s))), crc);
+    assert_eq!(refused(&|t| t.sensors.swap(0, 1)), crc);
+    assert_eq!(refused(&|t| t.sensors[1].kind = SensorKind::Counter), crc);
     assert_eq!(refused(&|t| core::mem::swap(&mut t.laws.lqr, &mut t.laws.pole_placement)), crc);
     let mut one = full();
     one.laws.lqr = None;
@@ -212,10 +223,27 @@ fn every_number_that_is_not_finite_is_refused_even_with_the_right_checksum() {
 }
 
 #[test]
+fn whole_turns_are_taken_off_where_the_joint_rests() {
+    let mut table: GainTable<6, 3> = full().resized();
+    for (sensor, turn_counts) in table.sensors.iter_mut().zip([0, 4096, 1000]) {
+        sensor.turn_counts = turn_counts;
+    }
+    let unwound = |counts, bits| table.unwound(&counts, Equilibrium::of_bits(bits));
+    assert_eq!(unwound([7, 3 * 4096 + 5, -1003], 0b00), [7, 5, -3]);
+    assert_eq!(unwound([70_000, -2047, 998], 0b11), [70_000, 2049, -2]);
+    // Link 1 is down, link 2 up: its joint rests half a turn back.
+    assert_eq!(unwound([0, 2040, 502], 0b01), [0, 2040, -498]);
+    assert_eq!(unwound([0, -5, -502], 0b10), [0, -5, 498]);
+    let from_rest = |counts, bits| table.from_rest(&counts, Equilibrium::of_bits(bits));
+    assert_eq!(from_rest([7, 2040, 502], 0b01), [7, -8, 2]);
+    assert_eq!(table.within_half_a_turn(&[-5000, 4096 + 7, -1009]), [-5000, 7, -9]);
+}
+
+#[test]
 fn a_table_in_another_size_and_back_is_the_same() {
     let good = full();
     let wide: GainTable<7, 5> = good.resized();
-    assert_eq!(wide.limits.turn_counts, [0, 4096, 0, 0, 0]);
+    assert_eq!(wide.sensors.map(|sensor| sensor.turn_counts), [0, 4096, 0, 0, 0]);
     let back: GainTable<4, 2> = wide.resized();
     assert_eq!(back, good);
 }
@@ -244,7 +272,7 @@ impl Reader for Names {
 
     fn variant(&mut self, _: Variant) {}
 
-    fn list(&mut self, _: usize) {}
+    fn list(&mut self, _: usize, _: Shape) {}
 
     fn end(&mut self) {}
 }
@@ -260,7 +288,7 @@ fn a_reader_hears_every_name_in_the_order_of_declaration() {
         assert!(found.is_some(), "{name}");
         rest = &rest[found.unwrap() + name.len()..];
     }
-    assert_eq!(names.0.last().map(String::as_str), Some("still_counts"));
+    assert_eq!(names.0.last().map(String::as_str), Some("energy"));
 }
 
 /// Columns of a motion for four states and two sensors, with four knots: reference, force and gains; and the filter.

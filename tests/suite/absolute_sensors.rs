@@ -8,7 +8,7 @@ use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright::table::Law;
+use upright::table::{Law, ReadingMap, SensorKind};
 use upright_closed_loop::harness::{World, record, with_firmware};
 use upright_design::design::detection_thresholds;
 use upright_design::numerics::spectral_radius;
@@ -38,7 +38,8 @@ fn the_firmware_raises_and_balances_every_rig_with_absolute_sensors() {
     for (name, noise_rad) in ALL_RIGS.iter().zip([4e-4, 2e-4, 1e-4, 2e-5]) {
         let rig = absolute(name, noise_rad);
         let values = table(&rig);
-        assert_eq!(values.absolute.zero_counts[..2], [-1, 3], "{name}");
+        let kinds = [SensorKind::Counter, SensorKind::Absolute(ReadingMap { bits: 14, zero_counts: 3 })];
+        assert_eq!([0, 1].map(|sensor| values.sensors[sensor].kind), kinds, "{name}");
         let scenario = Scenario { duration_s: 3.0, ..Scenario::at_rest(&rig, Law::Lqr) };
         let run = with_firmware(&values, |firmware| record(&rig, &values, &scenario, firmware));
         let run = run.unwrap().unwrap();
@@ -91,7 +92,8 @@ fn a_cart_with_an_absolute_sensor_is_where_its_turns_say() {
     let gain = |rig: &Rig| certified(rig).double.kalman.as_ref().unwrap().l_filter[(0, 0)];
     assert!(gain(&noisy) < 0.7 * gain(&encoder) && run(&noisy) != run(&encoder));
     assert_eq!(noisy.sensors()[0].step::<f64>(), 4.0 * step);
-    assert_eq!(table(&noisy).absolute.zero_counts[..2], [1 << 16, -1]);
+    let kinds = [SensorKind::Absolute(ReadingMap { bits: 16, zero_counts: 0 }), SensorKind::Counter];
+    assert_eq!([0, 1].map(|sensor| table(&noisy).sensors[sensor].kind), kinds);
 }
 
 /// What the firmware answers to homing while the single pendulum hangs with its sensor this far from its zero (rad),

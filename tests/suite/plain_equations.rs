@@ -9,7 +9,7 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{
-    AbsoluteZeros, DriveMap, ForceMap, FrictionMap, GainTable, Late, LawGains, Limits, ObserverGains, PerLaw,
+    DriveMap, ForceMap, FrictionMap, GainTable, Late, LawGains, Limits, ObserverGains, PerLaw, SensorRow,
     TABLE_FORMAT, Thresholds,
 };
 use upright_design::table::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_size};
@@ -52,11 +52,16 @@ fn table<const NX: usize, const NY: usize>(
     let ad = model(pattern, &mut number);
     let mut table = GainTable {
         format: TABLE_FORMAT,
-        states: NX as u32,
-        sensors: NY as u32,
+        dimensions: [NX as u32, NY as u32],
         output: 0,
         rig_hash: 1,
         tick_s: 0.01,
+        sensors: core::array::from_fn(|sensor| SensorRow {
+            state: 2 * if in_order { sensor } else { NY - 1 - sensor } as u32,
+            delay_s: if in_order { 0.0 } else { 0.1 * number().abs() },
+            step: number().abs(),
+            ..SensorRow::default()
+        }),
         drive: DriveMap::Force(ForceMap { limit_n: 3.0, late: Late { acts, stays } }),
         laws: PerLaw {
             lqr: Some(LawGains {
@@ -72,11 +77,6 @@ fn table<const NX: usize, const NY: usize>(
             ad,
             bd: SVector::from_fn(|_, _| number()),
             l: SMatrix::from_fn(|_, _| 0.3 * number()),
-            measured: core::array::from_fn(|sensor| {
-                2 * if in_order { sensor } else { NY - 1 - sensor } as u32
-            }),
-            delay_s: SVector::from_fn(|_, _| if in_order { 0.0 } else { 0.1 * number().abs() }),
-            step: SVector::from_fn(|_, _| number().abs()),
         }),
         friction: friction.then(|| FrictionMap {
             axes: SMatrix::from_fn(|row, _| if row < 2 { number().abs() } else { number() }),
@@ -84,7 +84,6 @@ fn table<const NX: usize, const NY: usize>(
         }),
         limits: Limits::none(),
         thresholds: Thresholds::none(),
-        absolute: AbsoluteZeros::none(),
         crc: 0,
     };
     table.crc = table.checksum();
@@ -110,9 +109,10 @@ impl<'t, const NX: usize, const NY: usize> Plain<'t, NX, NY> {
     fn tick(&mut self, target: f32, counts: &[u32; NY]) -> Vec<f32> {
         let (law, observer) = (self.table.laws.lqr.as_ref().unwrap(), self.table.observer.as_ref().unwrap());
         let e: [f32; NY] = core::array::from_fn(|i| {
-            let state = observer.measured[i] as usize;
+            let sensor = &self.table.sensors[i];
+            let state = sensor.state as usize;
             let rate = self.x.get(state + 1).copied().unwrap_or_default();
-            observer.step[i] * counts[i] as i32 as f32 - (self.x[state] - observer.delay_s[i] * rate)
+            sensor.step * counts[i] as i32 as f32 - (self.x[state] - sensor.delay_s * rate)
         });
         let x: [f32; NX] =
             core::array::from_fn(|i| (0..NY).fold(self.x[i], |sum, j| sum + observer.l[(i, j)] * e[j]));
@@ -238,7 +238,9 @@ impl WithSize for WithRoom {
             observer.ad.column_mut(beyond).fill(0.0);
             observer.l.row_mut(beyond).fill(0.0);
         }
-        observer.measured = observer.measured.map(|state| state.min(states as u32 - 1));
+        for sensor in &mut table.sensors {
+            sensor.state = sensor.state.min(states as u32 - 1);
+        }
         if self.spoilt {
             observer.ad[(states - 1, 0)] += 0.25;
         }

@@ -20,16 +20,15 @@ pub struct Recorder {
 impl Recorder {
     /// A recorder with an empty log, for a rig and its gain table.
     pub fn new(rig: &Rig, table: &TableValues) -> Self {
-        let sensors = table.sensors();
         let drive = DriveScale::of(rig, table.drive.largest_force_n().into());
         let log = Log::new(LogHeader {
             rig: rig.name.clone(),
             hash: rig.hash(),
             period_ns: (rig.tick.period_s * 1e9).round() as u32,
             drive,
-            hanging: table.limits.rest_counts.iter().take(sensors).map(|&count| count as u16).collect(),
+            hanging: table.rows().iter().map(|sensor| sensor.rest_counts as u16).collect(),
         });
-        let turns = table.limits.turn_counts.iter().take(sensors).copied().collect();
+        let turns = table.rows().iter().map(|sensor| sensor.turn_counts).collect();
         Self { log, turns, out_of_order: 0 }
     }
 

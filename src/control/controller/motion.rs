@@ -22,7 +22,7 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
             self.encoders.update(raw);
             return Self::off();
         };
-        let mut y = self.encoders.measure(raw, &observer.gains.step).data.0[0];
+        let mut y = self.encoders.measure(raw, observer.sensors);
         self.subtract_lead(&mut y);
         let e = &mut self.innovation.data.0[0];
         *e = observer.innovation(&y, &self.estimate.data.0[0]);
@@ -66,12 +66,11 @@ impl<const NX: usize, const NY: usize> Controller<'_, NX, NY> {
     /// Removes whole turns from the joints: from now on, the counter readings `raw` stand for the positions `counts`,
     /// and the estimate is shifted by as much.
     pub fn unwind(&mut self, raw: &[u32; NY], counts: &[i32; NY]) {
-        if let Mode::Running(observer) = &self.mode {
-            let (measured, step) = (&observer.gains.measured, &observer.gains.step);
+        if let Mode::Running(_) = &self.mode {
             let turns = counts.iter().zip(self.encoders.counts()).map(|(new, old)| new.wrapping_sub(*old));
-            for ((&state, step), turn) in measured.iter().zip(step).zip(turns) {
-                if let Some(position) = self.estimate.get_mut(state as usize) {
-                    *position += step * turn as f32;
+            for (sensor, turn) in self.table.sensors.iter().zip(turns) {
+                if let Some(position) = self.estimate.get_mut(sensor.state as usize) {
+                    *position += sensor.step * turn as f32;
                 }
             }
         }

@@ -10,7 +10,7 @@ impl<const NX: usize, const NY: usize, T: Scalar> Controller<'_, NX, NY, T> {
         let mut position = *self.encoders.counts().get(sensor)?;
         if let Mode::Running(observer) = &self.mode {
             let predicted = *observer.measured(&self.estimate.data.0[0]).get(sensor)?;
-            let counts = predicted / *observer.gains.step.get(sensor)?;
+            let counts = predicted / self.table.sensors.get(sensor)?.step;
             position = libm::floorf(counts.to_f32() + 0.5) as i32;
         }
         self.encoders.reading_at(sensor, position)

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::table::{
-    AbsoluteZeros, ForceMap, Late, Limits, ObserverGains, PerLaw, StepMap, TABLE_FORMAT, Thresholds, columns,
+    ForceMap, Late, Limits, ObserverGains, PerLaw, SensorRow, StepMap, TABLE_FORMAT, Thresholds, columns,
 };
 use nalgebra::{matrix, vector};
 
@@ -17,25 +17,21 @@ fn table() -> GainTable<2, 1> {
         LawGains { k: columns([[1.0, 2.0]]), k_pending: 0.5, k_integral: 0.0, n: 1.0, setpoint_step: 10.0 };
     let mut table = GainTable {
         format: TABLE_FORMAT,
-        states: 2,
-        sensors: 1,
+        dimensions: [2, 1],
         output: 0,
         rig_hash: 7,
         tick_s: 0.5,
+        sensors: [SensorRow { step: 0.25, ..SensorRow::default() }],
         drive: force(5.0, 1.0, 0.0),
         laws: PerLaw { lqr: Some(law), pole_placement: None },
         observer: Some(ObserverGains {
             ad: matrix![1.0, 0.5; 0.0, 1.0],
             bd: vector![0.0625, 0.25],
             l: matrix![0.5; 1.0],
-            measured: [0],
-            delay_s: vector![0.0],
-            step: vector![0.25],
         }),
         friction: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
-        absolute: AbsoluteZeros::none(),
         crc: 0,
     };
     table.crc = table.checksum();
@@ -135,8 +131,9 @@ fn a_table_that_does_not_fit_is_refused() {
     };
     assert_eq!(refused(&|_| (), true), None);
     assert_eq!(refused(&|t| t.format += 1, true), Some(TableError::Format));
-    assert_eq!(refused(&|t| t.states = 3, true), Some(TableError::Dimensions));
-    assert_eq!(refused(&|t| t.sensors = 2, true), Some(TableError::Dimensions));
+    assert_eq!(refused(&|t| t.dimensions[0] = 3, true), Some(TableError::Dimensions));
+    assert_eq!(refused(&|t| t.dimensions[1] = 2, true), Some(TableError::Dimensions));
+    assert_eq!(refused(&|t| t.sensors[0].state = 2, true), Some(TableError::Dimensions));
     assert_eq!(refused(&|t| t.output = 2, true), Some(TableError::Dimensions));
     assert_eq!(refused(&|t| t.drive = force(5.0, 2.0, 0.0), true), Some(TableError::Delay));
     assert_eq!(refused(&|t| t.drive = force(5.0, 1.0, -0.5), true), Some(TableError::Delay));
@@ -159,9 +156,6 @@ fn stepping() -> GainTable<2, 1> {
         ad: matrix![1.0, tick_s; 0.0, 1.0],
         bd: vector![0.5 * tick_s * tick_s, tick_s],
         l: matrix![0.0; 0.0],
-        measured: [0],
-        delay_s: vector![0.0],
-        step: vector![12.5e-6],
     };
     let steps = StepMap {
         step_m: 12.5e-6,
@@ -171,6 +165,7 @@ fn stepping() -> GainTable<2, 1> {
     };
     let mut table = GainTable {
         tick_s,
+        sensors: [SensorRow { step: 12.5e-6, ..SensorRow::default() }],
         drive: DriveMap::Pulses(steps),
         laws: PerLaw { lqr: Some(law), pole_placement: None },
         observer: Some(observer),

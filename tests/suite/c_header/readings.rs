@@ -83,7 +83,7 @@ fn a_counter_that_is_cleared_while_the_link_hangs_is_a_fault_and_never_balances(
     let (rig, table) = rig_and_table("single-quanser-ip02");
     let header = c_header(rig, table).unwrap();
     // Seven and a half turns after position 0, where an ESP32's pulse counter is cleared, more or less.
-    let cleared = (table.limits.turn_counts[1] / 2 * 15) as u32;
+    let cleared = (table.sensors[1].turn_counts / 2 * 15) as u32;
     let hanging = || Link::homed_at(cleared).stays(50, cleared);
     let run = hanging().then(ARM, 0).then(ARM, 0).stays(1, 0).then(CLEAR, 0).stays(1, 0);
     let answers = run.answers(&header);
@@ -103,7 +103,7 @@ fn a_counter_that_is_cleared_while_the_link_hangs_is_a_fault_and_never_balances(
     assert_eq!(glitch.then(0, cleared).then(CLEAR, cleared).at_the_end(&header), (READY, 0));
     assert_eq!(jump.then(CLEAR, 0).at_the_end(&header), (NOT_HOMED, 0));
     // Thrown by hand, at 25 turns a second.
-    let fast = (25.0 * f64::from(table.limits.turn_counts[1]) * rig.tick.period_s) as i32;
+    let fast = (25.0 * f64::from(table.sensors[1].turn_counts) * rig.tick.period_s) as i32;
     assert_eq!(hanging().turned(cleared + 9 * 4096, fast).at_the_end(&header), (READY, 0));
 }
 
@@ -113,7 +113,7 @@ fn readings_that_wrap_where_the_file_names_an_encoder_are_refused_at_the_seam() 
         return;
     }
     let (rig, table) = rig_and_table("single-quanser-ip02");
-    assert_eq!(table.limits.turn_counts[1], 4096);
+    assert_eq!(table.sensors[1].turn_counts, 4096);
     let header = c_header(rig, table).unwrap();
     let turned_upright =
         |hanging: u32, upright: u32| Link::homed_at(hanging).turned(upright, 50).stays(9, upright);
@@ -160,7 +160,7 @@ fn an_absolute_sensor_gives_the_bits_of_the_firmware_wherever_its_readings_wrap(
         let values = table(&rig);
         let mut run = recorded(&rig, &values, &scenario(&rig, Law::Lqr, 1500), None);
         // The firmware takes the position from the zero in the file, the controller in C from where it is homed.
-        run.input[0][3] = values.absolute.zero_counts[1] as u32;
+        run.input[0][3] = values.sensors[1].kind.reading().unwrap().zero_counts as u32;
         assert_eq!(run.fault, None);
         let program = Program::that_replays(&c_header(&rig, &values).unwrap(), STRICT);
         let upright = run.input[run.first][3];

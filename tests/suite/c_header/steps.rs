@@ -53,8 +53,10 @@ impl WithSize for StepRun<'_> {
         let mut at_zero = [0; NY];
         bench.read_counters_at_zero(&mut at_zero);
         let mut hanging = at_zero;
-        for (sensor, (reading, counts)) in hanging.iter_mut().zip(&table.limits.rest_counts).enumerate() {
-            *reading = Bench::reading(sensor, reading.wrapping_add(*counts as u32));
+        for (sensor, (reading, counts)) in
+            hanging.iter_mut().zip(table.sensors.map(|row| row.rest_counts)).enumerate()
+        {
+            *reading = Bench::reading(sensor, reading.wrapping_add(counts as u32));
         }
         let words = |action: u32, setpoint: f32, raw: &[u32]| {
             [action, setpoint.to_bits()].into_iter().chain(raw.iter().copied()).collect::<Vec<u32>>()
@@ -110,7 +112,7 @@ impl<'t, const NX: usize, const NY: usize> Balanced<'t, NX, NY> {
         controller.select(law).unwrap();
         controller.encoders_mut().home(at_zero, &[0; NY]);
         controller.follow(raw);
-        let upright = table.limits.unwound(controller.encoders().counts(), Equilibrium::UPRIGHT);
+        let upright = table.unwound(controller.encoders().counts(), Equilibrium::UPRIGHT);
         controller.encoders_mut().home(raw, &upright);
         controller.start(raw).unwrap();
         let mut detection = Detection::of_motor(table.drive.witness());

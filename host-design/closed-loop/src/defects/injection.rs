@@ -65,11 +65,11 @@ struct AbsoluteReading {
 impl AbsoluteReading {
     /// That of this sensor, whose counter is `counter`.
     fn of(table: &TableValues, sensor: usize, counter: u32) -> Self {
-        let bits = table.absolute.turn_counts(&table.limits, sensor).max(1).ilog2();
+        let kind = table.sensors[sensor].kind;
+        let bits = kind.reading().map_or(0, |reading| reading.bits);
         let mut board = AbsoluteSensor::new(bits);
         let at_zero = counter.wrapping_sub(board.count(counter & ((1 << bits) - 1)));
-        let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
-        Self { sensor: board, bits, at_zero, is_potentiometer }
+        Self { sensor: board, bits, at_zero, is_potentiometer: kind.is_potentiometer() }
     }
 
     /// The counter for a reading, of which only the bits that the sensor has are taken.
@@ -106,10 +106,10 @@ impl<'a> Injection<'a> {
             (None, _) | (_, Phase::Balancing | Phase::Jogging | Phase::Shaken) => &table.thresholds,
             (Some(swing_up), Phase::Raising | Phase::Lowering) => &swing_up.thresholds,
         };
-        let visible = |sensor: usize| match &table.observer {
-            Some(observer) => {
+        let visible = |sensor: usize| match table.observer {
+            Some(_) => {
                 let threshold = thresholds.innovation[sensor];
-                (threshold / observer.step[sensor]).ceil().min(1e9) as i64
+                (threshold / table.sensors[sensor].step).ceil().min(1e9) as i64
             }
             None => i64::MAX,
         };

@@ -64,13 +64,13 @@ impl Defect {
 
     /// Whether this sensor can have it, which not every sensor has.
     fn can_have(self, table: &TableValues, sensor: usize) -> bool {
+        let kind = table.sensors[sensor].kind;
         if self == Self::EncoderWireOpen {
-            return sensor >= first_encoder(table) && !table.absolute.is_absolute(sensor);
+            return sensor >= first_encoder(table) && !kind.is_absolute();
         }
         // Simulated pins have no room for a mark beside the cart's counter of 32 bits.
         let is_not_shown = sensor == 0 && self == Self::SampleInvalid;
-        let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
-        table.absolute.is_absolute(sensor) && !is_not_shown && !(self.is_of_frames() && is_potentiometer)
+        kind.is_absolute() && !is_not_shown && !(self.is_of_frames() && kind.is_potentiometer())
     }
 }
 

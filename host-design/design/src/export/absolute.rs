@@ -50,9 +50,8 @@ impl Readings {
     /// The members of the table, if a sensor is absolute.
     pub(super) fn initialise(&self, out: &mut Initializer) {
         if self.are_absolute() {
-            let of = |value: fn(&SensorReading) -> u32| self.sensors.iter().map(value).collect::<Vec<_>>();
-            out.indices("range", &of(|reading| reading.range));
-            out.indices("unused_bits", &of(|reading| reading.unused_bits));
+            out.indices("range", self.sensors.iter().map(|reading| reading.range));
+            out.indices("unused_bits", self.sensors.iter().map(|reading| reading.unused_bits));
             out.pairs("readings", self.sensors.iter().map(|reading| reading.readings));
         }
     }

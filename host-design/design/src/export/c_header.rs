@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use upright::control::observer::PredictionPattern;
 use upright::supervision::jumps::furthest_counts;
-use upright::table::{DriveMap, Law, LawGains, ObserverGains};
+use upright::table::{DriveMap, Law, LawGains, ObserverGains, SensorRow};
 
 use super::absolute::Readings;
 use super::initializer::Initializer;
@@ -87,7 +87,7 @@ fn constants(out: &mut String, name: &str, table: &TableValues, is_absolute: boo
     define("STATES", table.states().to_string())?;
     define("SENSORS", table.sensors().to_string())?;
     define("OUTPUT", table.output.to_string())?;
-    let is_late = table.observer.as_ref().is_some_and(has_delay);
+    let is_late = has_delay(table.rows());
     define("HAS_DELAY", u8::from(is_late).to_string())?;
     define("HAS_PENDING", u8::from(table.drive.late().acts != 0.0).to_string())?;
     define("LAWS", laws.len().to_string())?;
@@ -108,13 +108,13 @@ fn constants(out: &mut String, name: &str, table: &TableValues, is_absolute: boo
 }
 
 /// Whether a sensor's reading is old.
-fn has_delay(observer: &WidestObserver) -> bool {
-    observer.delay_s.iter().any(|&delay_s| delay_s != 0.0)
+fn has_delay(sensors: &[SensorRow]) -> bool {
+    sensors.iter().any(|sensor| sensor.delay_s != 0.0)
 }
 
 /// The members of `upright_table_type`, in the order of their declaration.
 fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readings) -> String {
-    let (states, sensors) = (table.states(), table.sensors());
+    let (states, sensors, rows) = (table.states(), table.sensors(), table.rows());
     let mut out = Initializer::new();
     out.line("    {");
     for (_, gains) in table.laws.present() {
@@ -131,10 +131,10 @@ fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readin
     out.columns("ad", observer.ad.data.0[..states].iter().map(|values| column(values)));
     out.floats("bd", column(&observer.bd.data.0[0]));
     out.columns("l", observer.l.data.0[..sensors].iter().map(|values| column(values)));
-    if has_delay(observer) {
-        out.floats("delay_s", observer.delay_s.data.0[0][..sensors].iter().copied());
+    if has_delay(rows) {
+        out.floats("delay_s", rows.iter().map(|sensor| sensor.delay_s));
     }
-    out.floats("step", observer.step.data.0[0][..sensors].iter().copied());
+    out.floats("step", rows.iter().map(|sensor| sensor.step));
     if let Some(friction) = &table.friction {
         let laws: Vec<usize> = table.laws.present().map(|(law, _)| 2 + law as usize).collect();
         let axis = |values: &[f32; 4]| [0, 1].iter().chain(&laws).map(|&row| values[row]).collect();
@@ -143,14 +143,14 @@ fn initializer(table: &TableValues, observer: &WidestObserver, readings: &Readin
     }
     drive(&mut out, &table.drive);
     supervision(&mut out, table);
-    out.indices("measured", &observer.measured[..sensors]);
-    out.counts("slow_counts", &table.limits.slow_counts[..sensors]);
-    out.counts("rest_counts", &table.limits.rest_counts[..sensors]);
-    out.counts("turn_counts", &table.limits.turn_counts[..sensors]);
-    let furthest = furthest_counts(&table.limits, &observer.step.data.0[0], table.tick_s);
+    out.indices("measured", rows.iter().map(|sensor| sensor.state));
+    out.counts("slow_counts", rows.iter().map(|sensor| sensor.slow_counts));
+    out.counts("rest_counts", rows.iter().map(|sensor| sensor.rest_counts));
+    out.counts("turn_counts", rows.iter().map(|sensor| sensor.turn_counts));
+    let furthest = furthest_counts(&table.limits, &table.sensors, table.tick_s);
     // At most what C compares with: nothing is too far.
     let furthest = furthest.map(|counts| i32::try_from(counts).unwrap_or(i32::MAX));
-    out.counts("furthest_counts", &furthest[..sensors]);
+    out.counts("furthest_counts", furthest.into_iter().take(sensors));
     readings.initialise(&mut out);
     out.sealed()
 }

@@ -48,16 +48,22 @@ impl Initializer {
     }
 
     /// An array of indices.
-    pub(super) fn indices(&mut self, name: &str, values: &[u32]) {
-        self.words.extend(values);
-        let literals: Vec<String> = values.iter().map(|value| format!("{value}ul")).collect();
+    pub(super) fn indices(&mut self, name: &str, values: impl IntoIterator<Item = u32>) {
+        let literal = |value: u32| {
+            self.words.push(value);
+            format!("{value}ul")
+        };
+        let literals: Vec<String> = values.into_iter().map(literal).collect();
         self.member(name, &format!("{{{}}}", literals.join(", ")));
     }
 
     /// An array of counts.
-    pub(super) fn counts(&mut self, name: &str, values: &[i32]) {
-        self.words.extend(values.iter().map(|&value| value as u32));
-        let literals: Vec<String> = values.iter().map(|value| format!("{value}l")).collect();
+    pub(super) fn counts(&mut self, name: &str, values: impl IntoIterator<Item = i32>) {
+        let literal = |value: i32| {
+            self.words.push(value as u32);
+            format!("{value}l")
+        };
+        let literals: Vec<String> = values.into_iter().map(literal).collect();
         self.member(name, &format!("{{{}}}", literals.join(", ")));
     }
 

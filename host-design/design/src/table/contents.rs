@@ -21,7 +21,9 @@ pub(super) enum TableNode {
     Struct(&'static str, Vec<Field>),
     /// A variant of an enum, as it is written in Rust, with what it holds.
     Variant(Variant, Option<Box<TableNode>>),
-    /// A list of structs.
+    /// An array of structs.
+    Rows(Vec<TableNode>),
+    /// A list of structs whose length is not part of its type.
     Structs(Vec<TableNode>),
 }
 
@@ -72,6 +74,7 @@ fn trim(node: &mut TableNode, length: &dyn Fn(usize) -> usize) {
         }
         TableNode::Struct(_, fields) => fields.iter_mut().for_each(|field| trim(&mut field.value, length)),
         TableNode::Variant(_, node) => node.iter_mut().for_each(|node| trim(node, length)),
+        TableNode::Rows(rows) => rows.truncate(length(rows.len())),
         TableNode::Structs(nodes) => nodes.iter_mut().for_each(|node| trim(node, length)),
         TableNode::Value(_) | TableNode::Slice(_) => {}
     }
@@ -103,7 +106,7 @@ fn bytes_of(node: &TableNode) -> Vec<u8> {
         TableNode::Variant(Variant { number, .. }, node) => {
             number.to_le_bytes().into_iter().chain(node.iter().flat_map(|node| bytes_of(node))).collect()
         }
-        TableNode::Structs(nodes) => nodes.iter().flat_map(bytes_of).collect(),
+        TableNode::Rows(nodes) | TableNode::Structs(nodes) => nodes.iter().flat_map(bytes_of).collect(),
     }
 }
 
@@ -114,8 +117,8 @@ struct Builder {
     /// Fields still without a value, each with its variant if that holds the value; innermost last.
     waiting: Vec<(&'static str, Vec<&'static str>, Option<Variant>)>,
     /// Open lists of structs, innermost last: the number of structs that are open around the list, the number of its
-    /// structs that are still missing, and those that are complete.
-    lists: Vec<(usize, usize, Vec<TableNode>)>,
+    /// structs that are still missing, those that are complete, and what the list is.
+    lists: Vec<(usize, usize, Vec<TableNode>, Shape)>,
     done: Option<TableNode>,
 }
 
@@ -128,7 +131,7 @@ impl Builder {
     }
 
     fn value(&mut self, node: TableNode) {
-        if let Some((depth, missing, nodes)) = self.lists.last_mut()
+        if let Some((depth, missing, nodes, _)) = self.lists.last_mut()
             && *depth == self.open.len()
             && *missing > 0
         {
@@ -152,8 +155,9 @@ impl Builder {
 
     /// Passes the innermost list on as the value of its field, once all of its structs are there.
     fn complete_list(&mut self) {
-        if let Some((_, _, nodes)) = self.lists.pop_if(|(_, missing, _)| *missing == 0) {
-            self.value(TableNode::Structs(nodes));
+        if let Some((_, _, nodes, shape)) = self.lists.pop_if(|(_, missing, ..)| *missing == 0) {
+            let is_array = shape == Shape::List;
+            self.value(if is_array { TableNode::Rows(nodes) } else { TableNode::Structs(nodes) });
         }
     }
 }
@@ -190,8 +194,8 @@ impl Reader for Builder {
         }
     }
 
-    fn list(&mut self, length: usize) {
-        self.lists.push((self.open.len(), length, Vec::new()));
+    fn list(&mut self, length: usize, shape: Shape) {
+        self.lists.push((self.open.len(), length, Vec::new(), shape));
         self.complete_list();
     }
 
@@ -232,7 +236,7 @@ impl Serialize for TableNode {
             TableNode::Variant(Variant { name: "Some" | "None", .. }, node) => node.serialize(serializer),
             TableNode::Variant(variant, None) => serializer.serialize_str(variant.last_name()),
             TableNode::Variant(variant, Some(node)) => serializer.collect_map([(variant.last_name(), node)]),
-            TableNode::Structs(nodes) => serializer.collect_seq(nodes),
+            TableNode::Rows(nodes) | TableNode::Structs(nodes) => serializer.collect_seq(nodes),
         }
     }
 }

@@ -149,6 +149,20 @@ impl Writer<'_> {
         Ok(())
     }
 
+    /// Writes an array of structs, each on one line, below the comments of their fields.
+    fn rows(&mut self, name: &str, rows: &[TableNode]) -> core::fmt::Result {
+        let lines = |writer: &mut Self| {
+            if let Some(TableNode::Struct(_, fields)) = rows.first() {
+                for Field { name, documentation, .. } in fields {
+                    let documentation: Vec<&str> = documentation.iter().map(|line| line.trim()).collect();
+                    writer.line(&format!("// - {name}: {}", documentation.join(" ")))?;
+                }
+            }
+            rows.iter().try_for_each(|row| writer.line(&format!("{},", inline(row)?)))
+        };
+        self.block(&format!("{name}: ["), lines, "],")
+    }
+
     fn value(&mut self, name: &str, value: &TableNode) -> core::fmt::Result {
         match value {
             TableNode::Value(number) => match name {
@@ -190,6 +204,7 @@ impl Writer<'_> {
                 }
                 _ => Err(core::fmt::Error),
             },
+            TableNode::Rows(rows) => self.rows(name, rows),
             TableNode::Structs(nodes) if nodes.is_empty() => self.line(&format!("{name}: &[],")),
             TableNode::Structs(nodes) => {
                 let lines = |writer: &mut Self| {
@@ -203,6 +218,21 @@ impl Writer<'_> {
                 self.block(&format!("{name}: &["), lines, "],")
             }
         }
+    }
+}
+
+/// A value on one line, without comments.
+fn inline(value: &TableNode) -> Result<String, core::fmt::Error> {
+    match value {
+        TableNode::Value(number) => Ok(literal(*number)),
+        TableNode::Variant(variant, None) => Ok(variant.name.to_owned()),
+        TableNode::Variant(variant, Some(node)) => Ok(format!("{}({})", variant.name, inline(node)?)),
+        TableNode::Struct(kind, fields) => {
+            let field = |field: &Field| Ok(format!("{}: {}", field.name, inline(&field.value)?));
+            let fields: Result<Vec<String>, core::fmt::Error> = fields.iter().map(field).collect();
+            Ok(format!("{kind} {{ {} }}", fields?.join(", ")))
+        }
+        _ => Err(core::fmt::Error),
     }
 }
 

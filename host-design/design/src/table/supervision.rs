@@ -1,11 +1,11 @@
 //! Limits and thresholds of the supervisor, from the rig file to the firmware's types.
 
-use upright::table::{AbsoluteZeros, Limits, MotorTest, Thresholds};
+use upright::table::{Limits, MotorTest, ReadingMap, SensorKind, SensorRow, Thresholds};
 
-use super::any_size::MAX_SENSORS;
+use super::any_size::{MAX_SENSORS, MAX_STATES};
 use super::error::{NoTable, finite};
 use crate::design::DetectionDesign;
-use crate::rig::{Chain, Rig, defaults};
+use crate::rig::{Chain, Rig, Sensor, defaults};
 
 /// Motion by hand that the sign check of an encoder requires: of a link (rad) …
 const SIGN_RAD: f64 = 0.2;
@@ -17,7 +17,7 @@ const SIGN_SHARE: f64 = 0.05;
 const STILL_DEVIATIONS: f64 = 7.0;
 
 /// Limits of `rig`, whose sensors have these steps (m or rad). Without steps there are no limits in counts.
-pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits<MAX_SENSORS>, NoTable> {
+pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits, NoTable> {
     let wanted = &rig.limits;
     let ticks = |seconds: f64| (seconds / rig.tick.period_s).round().clamp(1.0, f64::from(u32::MAX)) as u32;
     let none = Limits::none();
@@ -38,12 +38,7 @@ pub(super) fn limits(rig: &Rig, steps: &[f64]) -> Result<Limits<MAX_SENSORS>, No
     Ok(limits)
 }
 
-fn set_limits_of_chain(
-    limits: &mut Limits<MAX_SENSORS>,
-    rig: &Rig,
-    chain: &Chain,
-    steps: &[f64],
-) -> Result<(), NoTable> {
+fn set_limits_of_chain(limits: &mut Limits, rig: &Rig, chain: &Chain, steps: &[f64]) -> Result<(), NoTable> {
     let wanted = &rig.limits;
     let [low, high] = chain.cart.travel_m;
     let length = high - low;
@@ -52,37 +47,62 @@ fn set_limits_of_chain(
     let angle = wanted.angle_rad.unwrap_or(defaults::ANGLE_RAD);
     limits.angle_rad = angle as f32;
     limits.arm_angle_rad = wanted.arm_angle_rad.unwrap_or(defaults::ARM_ANGLE_SHARE * angle) as f32;
-    let Some((&cart, joints)) = steps.split_first() else { return Ok(()) };
+    let Some(&cart) = steps.first() else { return Ok(()) };
     let tolerance = wanted.travel_tolerance_m.unwrap_or(defaults::TRAVEL_TOLERANCE_SHARE * length);
     limits.travel_counts = [counts(length, cart), counts(tolerance, cart).max(1)];
     limits.middle_counts = counts(0.5 * (low + high), cart);
-    let slow = |rate: f64, step: f64| counts(rate * wanted.arm_time_s, step).max(1);
-    limits.slow_counts[0] = slow(wanted.arm_speed_m_per_s, cart);
-    // The count of a drive with pulses has the sign of the pulses.
-    let has_encoder = !rig.actuator.held().is_motion();
-    limits.sign_counts[0] = if has_encoder { counts(SIGN_SHARE * length, cart).max(1) } else { 0 };
-    for (joint, &step) in joints.iter().enumerate() {
-        let sensor = joint + 1;
-        limits.slow_counts[sensor] = slow(wanted.arm_rate_rad_per_s, step);
-        limits.sign_counts[sensor] = counts(SIGN_RAD, step).max(1);
-        limits.turn_counts[sensor] = counts(core::f64::consts::TAU, step).max(1);
-    }
-    if let (Some(rest), Some(&step)) = (limits.rest_counts.get_mut(1), joints.first()) {
-        *rest = counts(core::f64::consts::PI, step);
-    }
     Ok(())
 }
 
-/// Zeros of the absolute sensors of `rig`, whose sensors have these steps.
-pub(super) fn absolute_zeros(rig: &Rig, steps: &[f64]) -> AbsoluteZeros<MAX_SENSORS> {
-    let mut zeros = AbsoluteZeros::none();
-    for (sensor, (description, &step)) in rig.sensors().iter().zip(steps).enumerate() {
-        if let Some(range) = description.absolute {
-            zeros.zero_counts[sensor] = if sensor == 0 { range.turn } else { range.zero } as i32;
-            zeros.still_counts[sensor] = 1 + counts(STILL_DEVIATIONS * description.noise, step);
-        }
+/// The `number` sensors of `rig`. With an observer they have steps, exact ones and those of the table (m or rad);
+/// without one, they have no distances in counts.
+pub(super) fn sensors(rig: &Rig, number: usize, steps: &[f64], rounded: &[f32]) -> [SensorRow; MAX_SENSORS] {
+    let described = rig.sensors();
+    core::array::from_fn(|index| {
+        let state = if index < number { 2 * index } else { MAX_STATES };
+        let row =
+            SensorRow { state: state as u32, slow_counts: i32::MAX, still_counts: 1, ..SensorRow::default() };
+        let sensor = described.get(index).zip(steps.get(index)).zip(rounded.get(index));
+        sensor.map_or(row, |((sensor, &step), &rounded)| {
+            let row = as_read(sensor, step, SensorRow { step: rounded, ..row });
+            rig.chain().map_or(row, |chain| with_distances(rig, chain, index, step, row))
+        })
+    })
+}
+
+/// The row with what this sensor measures, and how it reads.
+fn as_read(sensor: &Sensor, step: f64, row: SensorRow) -> SensorRow {
+    let row = SensorRow { state: sensor.state as u32, delay_s: sensor.delay_s as f32, ..row };
+    let Some(range) = sensor.absolute else { return row };
+    let reading = ReadingMap { bits: range.bits, zero_counts: range.zero as i32 };
+    SensorRow {
+        kind: match range.has_dead_band() {
+            true => SensorKind::Potentiometer(reading),
+            false => SensorKind::Absolute(reading),
+        },
+        still_counts: 1 + counts(STILL_DEVIATIONS * sensor.noise, step),
+        ..row
     }
-    zeros
+}
+
+/// The row with the distances in counts of this sensor of a chain: the cart's is the first.
+fn with_distances(rig: &Rig, chain: &Chain, index: usize, step: f64, row: SensorRow) -> SensorRow {
+    let wanted = &rig.limits;
+    let slow = |rate: f64| counts(rate * wanted.arm_time_s, step).max(1);
+    if index == 0 {
+        let [low, high] = chain.cart.travel_m;
+        // The count of a drive with pulses has the sign of the pulses.
+        let has_encoder = !rig.actuator.held().is_motion();
+        let sign_counts = if has_encoder { counts(SIGN_SHARE * (high - low), step).max(1) } else { 0 };
+        return SensorRow { slow_counts: slow(wanted.arm_speed_m_per_s), sign_counts, ..row };
+    }
+    SensorRow {
+        turn_counts: counts(core::f64::consts::TAU, step).max(1),
+        rest_counts: if index == 1 { counts(core::f64::consts::PI, step) } else { 0 },
+        sign_counts: counts(SIGN_RAD, step).max(1),
+        slow_counts: slow(wanted.arm_rate_rad_per_s),
+        ..row
+    }
 }
 
 /// Thresholds of a design; without one, thresholds that nothing exceeds.

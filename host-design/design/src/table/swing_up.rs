@@ -148,7 +148,7 @@ impl SwingUpValues {
 
 impl MotionValues {
     fn of(table: &WidestTable, motion: &PlannedMotion) -> Result<Self, NoTable> {
-        let (states, sensors, ticks) = (table.states as usize, table.sensors as usize, motion.steps());
+        let ([states, sensors], ticks) = (table.dimensions.map(|number| number as usize), motion.steps());
         let sizes = motion.x.first().map(Vec::len) == Some(states)
             && motion.l.first().map(|l| (l.rows(), l.cols())) == Some((states, sensors));
         if !sizes || motion.tick_s as f32 != table.tick_s {

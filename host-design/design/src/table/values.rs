@@ -6,16 +6,14 @@ use nalgebra::SVector;
 use serde::{Serialize, Serializer};
 use upright::table::{
     DriveMap, ForceMap, GainTable, Late, LawGains, MotionLimits, MotorMap, ObserverGains, PerLaw, Resize,
-    StepMap, TABLE_FORMAT,
+    SensorRow, StepMap, TABLE_FORMAT,
 };
 
-use super::any_size::{MAX_SENSORS, MAX_STATES, WidestTable, WithSize, widest, with_size};
+use super::any_size::{MAX_STATES, WidestTable, WithSize, widest, with_size};
 use super::error::{NoTable, finite};
 use super::swing_up::SwingUpValues;
 use super::{contents, friction, supervision};
-use crate::design::{
-    Certified, Design, Feedback, Kalman, Uncertified, detection_thresholds, setpoint_step, shares,
-};
+use crate::design::{Certified, Design, Feedback, Uncertified, detection_thresholds, setpoint_step, shares};
 use crate::rig::{AccelerationDrive, Actuator, Motor, PlantDescription, Rig};
 
 /// Which gains go into a table.
@@ -94,22 +92,26 @@ impl TableValues {
             (None, PlantDescription::Model(_)) => 1,
         };
         let steps = double.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
+        let rounded = single.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, double);
         let friction = friction::friction_map(rig, double)?;
         let widest = GainTable {
             format: TABLE_FORMAT,
-            states: states as u32,
-            sensors: sensors as u32,
+            dimensions: [states as u32, sensors as u32],
             output: rig.output() as u32,
             rig_hash: rig.hash(),
             tick_s: finite("tick.period_s", rig.tick.period_s as f32)?,
+            sensors: supervision::sensors(rig, sensors, steps, rounded),
             drive: drive_map(rig)?,
             laws,
-            observer: single.kalman.as_ref().map(|kalman| observer(rig, single, kalman)),
+            observer: single.kalman.as_ref().map(|kalman| ObserverGains {
+                ad: widest(&single.ad),
+                bd: widest(&single.bd),
+                l: widest(&kalman.l_filter),
+            }),
             friction,
             limits: supervision::limits(rig, steps)?,
             thresholds: supervision::thresholds(detection.as_ref()),
-            absolute: supervision::absolute_zeros(rig, steps),
             crc: 0,
         };
         let values = Self { rig: rig.name.clone(), swing_up: None, widest };
@@ -155,21 +157,22 @@ impl TableValues {
 
     /// Number of states.
     pub fn states(&self) -> usize {
-        self.widest.states as usize
+        self.widest.dimensions[0] as usize
     }
 
     /// Number of sensors.
     pub fn sensors(&self) -> usize {
-        self.widest.sensors as usize
+        self.widest.dimensions[1] as usize
+    }
+
+    /// The rows of the sensors that the table has.
+    pub fn rows(&self) -> &[SensorRow] {
+        &self.widest.sensors[..self.sensors()]
     }
 
     /// The states that the sensors measure; those of a chain are the positions, with or without observer.
     pub fn measured(&self) -> Vec<usize> {
-        let sensors = 0..self.sensors();
-        match &self.observer {
-            Some(observer) => sensors.map(|sensor| observer.measured[sensor] as usize).collect(),
-            None => sensors.map(|sensor| 2 * sensor).collect(),
-        }
+        self.rows().iter().map(|sensor| sensor.state as usize).collect()
     }
 
     /// The firmware's table, complete with its checksum.
@@ -189,7 +192,7 @@ impl TableValues {
     pub fn padded<const NX: usize, const NY: usize>(&self) -> GainTable<NX, NY> {
         assert!(self.states() <= NX && self.sensors() == NY, "states and sensors of the table");
         let mut table: GainTable<NX, NY> = self.widest.resized();
-        table.states = NX as u32;
+        table.dimensions[0] = NX as u32;
         table.crc = table.checksum();
         table
     }
@@ -258,22 +261,6 @@ fn laws(
     let gains = |law| laws[law].map(|gains| law_gains(gains, rig.states(), steps[law])).transpose();
     let laws = PerLaw::from_fn(gains).transpose()?;
     if laws.present().next().is_none() { Err(NoTable::NoLaw) } else { Ok(laws) }
-}
-
-fn observer(rig: &Rig, design: &Design<f32>, kalman: &Kalman<f32>) -> ObserverGains<MAX_STATES, MAX_SENSORS> {
-    let mut measured = [MAX_STATES as u32; MAX_SENSORS];
-    let mut delay_s = SVector::zeros();
-    for (index, sensor) in rig.sensors().into_iter().enumerate() {
-        (measured[index], delay_s[index]) = (sensor.state as u32, sensor.delay_s as f32);
-    }
-    ObserverGains {
-        ad: widest(&design.ad),
-        bd: widest(&design.bd),
-        l: widest(&kalman.l_filter),
-        measured,
-        delay_s,
-        step: widest(&kalman.steps),
-    }
 }
 
 /// K of a design holds the gains on the states, then on the integral, then on the pending force, if there are any.

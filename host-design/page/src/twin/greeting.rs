@@ -50,7 +50,7 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "force_limit_n": table.drive.largest_force_n(),
         "input": if table.drive.pulses().is_some() { ["Acceleration", "m/s²"] } else { ["Force", "N"] },
         "step": table.observer.as_ref()
-            .map(|observer| observer.step.iter().take(table.sensors()).copied().collect::<Vec<_>>()),
+            .map(|_| table.rows().iter().map(|sensor| sensor.step).collect::<Vec<_>>()),
         "sensors": (0..table.sensors()).map(|sensor| words::joint(sensor as u8)).collect::<Vec<_>>(),
         "laws": table.laws.present().map(|(law, _)| json!({ "name": law.option(), "title": law.title(), "value": law }))
             .collect::<Vec<Value>>(),

@@ -73,7 +73,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
             // Movement of the cart, or of the first link, that is needed to determine the motor's sign.
             During::Jog => {
                 let sensor = blind.drive.witness();
-                blind.limits.sign_counts[sensor] = 0;
+                blind.sensors[sensor].sign_counts = 0;
             }
             During::Shaking(_) => blind_while_shaken(&mut blind),
         }
@@ -98,9 +98,7 @@ pub(super) fn attempt(setup: &Setup<'_>, trial: &Trial, with_defect: bool) -> Re
 /// smaller.
 fn blind_while_shaken(table: &mut TableValues) {
     table.limits.jog_force_n *= BLIND;
-    if let Some(observer) = &mut table.observer {
-        observer.step.iter_mut().skip(1).for_each(|step| *step /= BLIND);
-    }
+    table.sensors.iter_mut().skip(1).for_each(|sensor| sensor.step /= BLIND);
 }
 
 /// What is needed to inject defects that only a board has.

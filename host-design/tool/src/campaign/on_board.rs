@@ -136,7 +136,7 @@ impl OnChip for Defect {
 fn of_absolute_sensor(trial: &Trial, table: &TableValues, tick: Time, random: &mut Pcg64) -> Vec<Event> {
     let at = |after: Time, input: Input| Event::Input { after, input };
     match trial.kind {
-        Defect::SensorWire if table.absolute.is_potentiometer(&table.limits, trial.sensor) => {
+        Defect::SensorWire if table.sensors[trial.sensor].kind.is_potentiometer() => {
             // It turns on all the time.
             let share = if trial.sign > 0.0 { 0.0 } else { 1.0 };
             let ticks = 0..trial.watched as Time;

@@ -58,7 +58,7 @@ pub(super) fn turns(guide: &mut Guide<'_>, plan: CommissionPlan<'_>) -> Result<(
     for sensor in (1..plan.table.sensors()).rev() {
         guide.ask(PersonTask::Rest)?;
         guide.pause(ENDED)?;
-        let wanted = f64::from(plan.table.limits.turn_counts[sensor]);
+        let wanted = f64::from(plan.table.sensors[sensor].turn_counts);
         let Some(moved) = turn(guide, sensor, BEGUN * wanted)? else {
             return Err(Stop::Machine(format!(
                 "the encoder of link {sensor} does not count, or it was not turned"

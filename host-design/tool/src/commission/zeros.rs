@@ -141,7 +141,7 @@ fn hanging(
             })
             .collect();
         let moving = sensors.iter().zip(&all).find(|(sensor, hanging)| {
-            let noise = plan.table.absolute.still_counts[sensor.link];
+            let noise = plan.table.sensors[sensor.link].still_counts;
             hanging.range > 2.0 * f64::from(noise) + STILL_RAD / step(plan, sensor.link)
         });
         let Some((sensor, hanging)) = moving else {
@@ -186,7 +186,7 @@ fn moves(guide: &mut Guide<'_>, plan: CommissionPlan<'_>, sensor: &AbsoluteLink)
     let link = sensor.link;
     let from = guide.conversation().telemetry.as_ref().map_or(0.0, |now| count(now, link));
     guide.ask(PersonTask::Move(link as u8))?;
-    let enough = f64::from(plan.table.limits.sign_counts[link]);
+    let enough = f64::from(plan.table.sensors[link].sign_counts);
     let moved = guide.wait_for_person(|now| {
         Some(near(count(now, link) - from, sensor.turn)).filter(|moved| moved.abs() >= enough)
     })?;

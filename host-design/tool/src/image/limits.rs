@@ -3,7 +3,7 @@
 use upright::boards::rp::RpChip;
 use upright::boards::wiring::{Signal, Wire};
 use upright::boards::{BoardRow, Family, PULSES_HZ, f4};
-use upright::table::StepMap;
+use upright::table::{SensorKind, StepMap};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
@@ -63,16 +63,17 @@ fn has_bus(board: &BoardRow) -> bool {
 
 /// Checks that the board reads the absolute sensors of the table's rig, if it has any.
 fn reads_all(board: &'static BoardRow, table: &TableValues) -> Result<(), BuildError> {
-    for sensor in (0..table.sensors()).filter(|&sensor| table.absolute.is_absolute(sensor)) {
-        if !has_bus(board) {
+    for (sensor, row) in table.rows().iter().enumerate() {
+        if row.kind.is_absolute() && !has_bus(board) {
             return Err(BuildError::AbsoluteSensor { sensor });
         }
-        let turn = table.absolute.turn_counts(&table.limits, sensor);
-        match table.absolute.is_potentiometer(&table.limits, sensor) {
-            true if sensor != 1 || turn.ilog2() != f4::WIPER_BITS => {
+        match row.kind {
+            SensorKind::Potentiometer(reading) if sensor != 1 || reading.bits != f4::WIPER_BITS => {
                 return Err(BuildError::Potentiometer { board, link: sensor });
             }
-            false if turn != 1 << f4::ANGLE_BITS => return Err(BuildError::AngleBits { board, sensor }),
+            SensorKind::Absolute(reading) if reading.bits != f4::ANGLE_BITS => {
+                return Err(BuildError::AngleBits { board, sensor });
+            }
             _ => {}
         }
     }

@@ -66,7 +66,7 @@ fn the_image_balances_with_absolute_sensors_with_the_bits_of_the_host() {
 
         // Negative control: a sensor that is off by one reading on the board.
         let mut other = table.clone();
-        other.absolute.zero_counts[1] += 1;
+        other.sensors[1].kind.reading_mut().unwrap().zero_counts += 1;
         let mut board = VirtualBoard::start(&image, &Conditions::f405(1), &table).unwrap();
         let error = run_compared(&rig, &other, &scenario, &mut board).unwrap_err().to_string();
         assert!(error.contains("differ"), "{error}");
@@ -164,7 +164,7 @@ fn the_image_balances_with_a_potentiometer_with_the_bits_of_the_host() {
 
     // Negative control: a sensor that is off by one reading on the board.
     let mut other = table.clone();
-    other.absolute.zero_counts[1] += 1;
+    other.sensors[1].kind.reading_mut().unwrap().zero_counts += 1;
     let error = run_compared(&rig, &other, &scenario, &mut start()).unwrap_err().to_string();
     assert!(error.contains("differ"), "{error}");
 

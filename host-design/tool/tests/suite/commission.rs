@@ -86,7 +86,7 @@ fn a_machine_with_absolute_sensors_passes_unless_the_zero_of_one_is_another() {
     let (_, table) = rig_and_table(NAME);
     assert_eq!(stopped(NAME, table, None, early()), None);
     let mut other = table.clone();
-    other.absolute.zero_counts[2] += 400;
+    other.sensors[2].kind.reading_mut().unwrap().zero_counts += 400;
     let (step, words) = stopped(NAME, &other, None, early()).expect("it is found");
     assert!(step == CommissionStep::Homing && words.contains("--zeros"), "{step:?}: {words}");
 }
@@ -238,11 +238,10 @@ fn every_planted_defect_is_found_in_its_step() {
 /// The table with limits that disable the firmware's own check of a step.
 fn blind(table: &TableValues, step: CommissionStep) -> TableValues {
     let mut table = table.clone();
-    let limits = &mut table.limits;
     match step {
-        CommissionStep::Homing => limits.travel_counts[1] = i32::MAX,
-        CommissionStep::Signs => limits.sign_counts = [0; 15],
-        CommissionStep::Motor => limits.sign_counts[0] = 0,
+        CommissionStep::Homing => table.limits.travel_counts[1] = i32::MAX,
+        CommissionStep::Signs => table.sensors.iter_mut().for_each(|sensor| sensor.sign_counts = 0),
+        CommissionStep::Motor => table.sensors[0].sign_counts = 0,
         _ => {}
     }
     table

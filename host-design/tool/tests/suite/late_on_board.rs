@@ -40,7 +40,7 @@ fn the_image_makes_up_for_a_late_force_and_old_readings_with_the_bits_of_the_hos
         assert!(messages > 100, "{ticks} {messages}");
         // Negative control: a host that takes the readings for older.
         let mut other = table.clone();
-        other.observer.as_mut().unwrap().delay_s[1] += 1e-3;
+        other.sensors[1].delay_s += 1e-3;
         let Err(error) = run(&other) else { panic!("{}: the same bits", rig.name) };
         let error = error.to_string();
         assert!(error.contains("differ"), "{error}");

@@ -99,7 +99,7 @@ impl<R: Real> Numbers<R> {
                 ad: Matrix::from_fn(states, states, |i, j| exact(observer.ad[(i, j)])),
                 bd: column(&observer.bd),
                 l: Matrix::from_fn(states, sensors, |i, j| exact(observer.l[(i, j)])),
-                step: observer.step.iter().take(sensors).map(|&step| exact(step)).collect(),
+                step: table.rows().iter().map(|sensor| exact(sensor.step)).collect(),
             }),
             c: measurement(table),
             output: table.output as usize,
@@ -165,11 +165,13 @@ impl<R: Real> Numbers<R> {
 
 /// C of `y = C x` for what the controller measures: the states with encoders, or all.
 fn measurement<R: Real>(table: &TableValues) -> Matrix<R> {
-    let Some(observer) = &table.observer else { return Matrix::identity(table.states()) };
-    let measured = table.measured();
-    Matrix::from_fn(measured.len(), table.states(), |i, j| match measured[i] {
+    if table.observer.is_none() {
+        return Matrix::identity(table.states());
+    }
+    let rows = table.rows();
+    Matrix::from_fn(rows.len(), table.states(), |i, j| match rows[i].state as usize {
         state if state == j => R::one(),
-        state if state + 1 == j => R::from_f64(-f64::from(observer.delay_s[i])),
+        state if state + 1 == j => R::from_f64(-f64::from(rows[i].delay_s)),
         _ => R::zero(),
     })
 }

@@ -12,7 +12,7 @@ use upright_design::plant::absolute_angles;
 use upright_design::reality::{corner_machine, corners_of};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Disturbance, Scenario, SimulationError, run};
-use upright_design::table::{MAX_SENSORS, TableValues};
+use upright_design::table::TableValues;
 
 /// Duration of a run at a corner of `[robust]` (s).
 const CORNER_S: f64 = 20.0;
@@ -74,7 +74,7 @@ impl LimitShare {
         most(most(self.rail, self.angle), self.speed)
     }
 
-    fn at(limits: &Limits<MAX_SENSORS>, state: &[f64]) -> Self {
+    fn at(limits: &Limits, state: &[f64]) -> Self {
         let &[position, speed, ..] = state else { return Self::default() };
         // In the table, a limit that is not there is the largest number.
         let share = |of: f64, limit: f32| (limit.abs() < f32::MAX).then(|| of / f64::from(limit));

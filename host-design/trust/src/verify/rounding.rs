@@ -6,8 +6,8 @@ use upright::control::controller::Controller;
 use upright::control::encoder::CounterWidth;
 use upright::control::state_feedback::saturate;
 use upright::table::{
-    AbsoluteZeros, DriveMap, ForceMap, FrictionMap, GainTable, Late, Law, LawGains, Limits, ObserverGains,
-    PerLaw, Thresholds,
+    DriveMap, ForceMap, FrictionMap, GainTable, Late, Law, LawGains, Limits, ObserverGains, PerLaw,
+    SensorRow, Thresholds,
 };
 
 use super::loop_model::{LoopModel, Numbers, seen_plant};
@@ -145,23 +145,25 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         setpoint_step: f64::MAX,
     });
     let [acts, stays] = exact.pending;
-    let observer = table.observer.as_ref().zip(exact.observer.as_ref());
+    let observer = exact.observer.as_ref().filter(|_| table.observer.is_some());
+    let sensor = |index: usize| {
+        let SensorRow { state, kind, delay_s, .. } = table.sensors[index];
+        let step = observer.and_then(|observer| observer.step.get(index)).copied().unwrap_or_default();
+        SensorRow { state, kind, step, delay_s: delay_s.into(), ..SensorRow::default() }
+    };
     GainTable {
         format: table.format,
-        states: table.states,
-        sensors: table.sensors,
+        dimensions: table.dimensions,
         output: table.output,
         rig_hash: table.rig_hash,
         tick_s: exact.tick_s,
+        sensors: core::array::from_fn(sensor),
         drive: DriveMap::Force(ForceMap { limit_n: f64::MAX, late: Late { acts, stays } }),
         laws,
-        observer: observer.map(|(single, exact)| ObserverGains {
+        observer: observer.map(|exact| ObserverGains {
             ad: widest(&exact.ad),
             bd: widest(&exact.bd),
             l: widest(&exact.l),
-            measured: single.measured,
-            delay_s: single.delay_s.map(f64::from),
-            step: widest(&Matrix::column(&exact.step)),
         }),
         friction: table.friction.as_ref().map(|single| FrictionMap {
             axes: single.axes.map(f64::from),
@@ -169,7 +171,6 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         }),
         limits: Limits::none(),
         thresholds: Thresholds::none(),
-        absolute: AbsoluteZeros::none(),
         crc: 0,
     }
 }
@@ -203,10 +204,11 @@ impl<'t> Shadow<'t> {
                 self.controller.set_setpoint(sample.setpoint)?;
                 self.controller.control_from_state(&x)
             }
-            Some(observer) => {
+            Some(_) => {
                 let mut counts = [0; MAX_SENSORS];
                 for (sensor, state) in self.table.measured().into_iter().enumerate() {
-                    counts[sensor] = libm::round(sample.state[state] / observer.step[sensor]) as i32 as u32;
+                    counts[sensor] =
+                        libm::round(sample.state[state] / self.double.sensors[sensor].step) as i32 as u32;
                 }
                 if !self.is_started {
                     self.controller.start(&counts)?;

@@ -16,8 +16,7 @@ pub(super) const ANY_IS_ON_BUS: bool = {
     let (mut any, mut sensor) = (false, 0);
     while sensor < SENSORS {
         if is_on_bus(sensor) {
-            let turn = TABLE.absolute.turn_counts(&TABLE.limits, sensor);
-            assert!(turn == 1 << ANGLE_BITS, "an absolute sensor of other bits");
+            assert!(has_bits(sensor, ANGLE_BITS), "an absolute sensor of other bits");
             any = true;
         }
         sensor += 1;
@@ -27,8 +26,7 @@ pub(super) const ANY_IS_ON_BUS: bool = {
 
 /// The wire of the wiper, if the rig has a potentiometer.
 pub(super) const WIPER_WIRE: Option<Wire> = if is_absolute(WIPER) && !is_on_bus(WIPER) {
-    let turn = TABLE.limits.turn_counts[WIPER];
-    assert!(turn > 1 << WIPER_BITS && turn < 2 << WIPER_BITS, "a potentiometer of other bits");
+    assert!(has_bits(WIPER, WIPER_BITS), "a potentiometer of other bits");
     Some(wire_of(BOARD.wiring, WIPER_SIGNAL))
 } else {
     None
@@ -39,12 +37,17 @@ pub(super) const ANY_IS_ABSOLUTE: bool = ANY_IS_ON_BUS || WIPER_WIRE.is_some();
 
 /// Whether a sensor of the rig is absolute.
 pub(super) const fn is_absolute(sensor: usize) -> bool {
-    sensor < SENSORS && TABLE.absolute.is_absolute(sensor)
+    sensor < SENSORS && TABLE.sensors[sensor].kind.is_absolute()
+}
+
+/// Whether the readings of an absolute sensor have so many bits.
+const fn has_bits(sensor: usize, bits: u32) -> bool {
+    matches!(TABLE.sensors[sensor].kind.reading(), Some(reading) if reading.bits == bits)
 }
 
 /// Whether a sensor of the rig is on the bus. Only one may be a potentiometer.
 pub(super) const fn is_on_bus(sensor: usize) -> bool {
-    is_absolute(sensor) && (sensor != WIPER || !TABLE.absolute.is_potentiometer(&TABLE.limits, sensor))
+    is_absolute(sensor) && (sensor != WIPER || !TABLE.sensors[sensor].kind.is_potentiometer())
 }
 
 /// Mode of a pin in this image; none, if it is left alone.

@@ -3,6 +3,7 @@
 use upright::boards::f4::{ANGLE_BITS, WIPER_BITS};
 use upright::control::encoder::{AbsoluteSensor, is_at_end};
 use upright::protocol::simulated_pins::BAD_SAMPLE;
+use upright::table::SensorKind;
 use upright_board::{Input, SimulatedBoard};
 use upright_design::table::TableValues;
 
@@ -17,11 +18,11 @@ pub(super) enum AbsoluteAtPins {
 impl AbsoluteAtPins {
     /// The sensor with this number, if it is absolute.
     pub(super) fn of(table: &TableValues, sensor: usize) -> Option<Self> {
-        let is_potentiometer = table.absolute.is_potentiometer(&table.limits, sensor);
-        table.absolute.is_absolute(sensor).then(|| match is_potentiometer {
-            true => Self::Potentiometer,
-            false => Self::OnBus(AbsoluteSensor::new(ANGLE_BITS)),
-        })
+        match table.sensors[sensor].kind {
+            SensorKind::Counter => None,
+            SensorKind::Absolute(_) => Some(Self::OnBus(AbsoluteSensor::new(ANGLE_BITS))),
+            SensorKind::Potentiometer(_) => Some(Self::Potentiometer),
+        }
     }
 
     /// Shows the board what the sensor reads; returns what the image makes of it (counts).
