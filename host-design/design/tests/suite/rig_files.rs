@@ -151,7 +151,7 @@ fn a_motor_that_is_known_by_its_motion_is_described_by_one_newton_per_ampere() {
     assert_eq!(rig.unusual_values(), []);
     let motor = rig.actuator.motor().unwrap();
     assert!((motor.newtons_per_amp() - 1.0).abs() < 1e-12);
-    let plant = MotorPlant::of(&motor);
+    let plant = MotorPlant::of(motor);
     for (duty, speed) in [(1.0, 0.0), (0.5, 0.3), (-0.75, -0.2)] {
         let wanted = mass * (b * duty * 12.0 - a * speed - c * f64::signum(duty));
         assert!((plant.force(duty, speed) - wanted).abs() < 1e-12, "duty {duty} at {speed} m/s");
