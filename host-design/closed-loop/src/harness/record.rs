@@ -104,6 +104,7 @@ struct RunRecord<'a> {
     trace: Trace,
     ticks: Vec<FirmwareTick>,
     pending: VecDeque<Pending>,
+    early: Option<AnyTelemetry>,
     next_tick: Option<u32>,
     telemetry_ticks: u32,
     /// Whether the drive takes pulses: what it applies is an acceleration that only the firmware knows.
@@ -121,6 +122,7 @@ impl<'a> RunRecord<'a> {
             trace: Trace::new(rig, ticks),
             ticks: Vec::with_capacity(ticks + 1),
             pending: VecDeque::new(),
+            early: None,
             next_tick: None,
             telemetry_ticks,
             takes_pulses: rig.actuator.held().is_motion(),
@@ -132,9 +134,15 @@ impl<'a> RunRecord<'a> {
 
     /// Joins the telemetry of each tick with the true state of the bench in that tick.
     fn take(&mut self, session: &mut Session<'_>) -> Result<(), HarnessError> {
-        while let Some(telemetry) = session.next_telemetry() {
+        while let Some(telemetry) = self.early.take().or_else(|| session.next_telemetry()) {
+            let is_before = |tick: &Pending| (telemetry.tick.wrapping_sub(tick.number) as i32) < 0;
+            let is_after = |tick: &Pending| (tick.number.wrapping_sub(telemetry.tick) as i32) < 0;
+            // A board sends it within the tick: the rig's state in that tick is recorded with the next one.
+            if self.pending.back().is_none_or(is_after) {
+                self.early = Some(telemetry);
+                return Ok(());
+            }
             // Of a tick before the run.
-            let is_before = |first: &Pending| (telemetry.tick.wrapping_sub(first.number) as i32) < 0;
             if self.next_tick.is_none() && self.pending.front().is_none_or(is_before) {
                 continue;
             }
@@ -143,8 +151,7 @@ impl<'a> RunRecord<'a> {
                 return Err(HarnessError::Lost(expected));
             }
             // The ticks in between have no telemetry of their own.
-            let older = |first: &Pending| (first.number.wrapping_sub(telemetry.tick) as i32) < 0;
-            while self.pending.front().is_some_and(older) {
+            while self.pending.front().is_some_and(is_after) {
                 self.pending.pop_front();
             }
             let Some(Pending { t, target, state, force, output, .. }) = self.pending.pop_front() else {
