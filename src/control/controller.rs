@@ -9,7 +9,7 @@ use crate::control::encoder::{CounterWidth, Encoders};
 use crate::control::observer::Observer;
 pub use crate::control::rejected::Rejected;
 use crate::control::state_feedback::{FeedbackSum, LawState, saturate, state_feedback};
-use crate::table::{DriveMap, GainTable, Law, LawGains, MotorMap, Scalar, TableError};
+use crate::table::{DriveMap, ForceMap, GainTable, Law, LawGains, MotorMap, Scalar, TableError};
 use nalgebra::SVector;
 
 /// Observer, control law and actuator map of one gain table.
@@ -361,16 +361,31 @@ impl<'t, const NX: usize, const NY: usize, T: Scalar> Controller<'t, NX, NY, T> 
     /// Limits the force and converts it for the power stage.
     #[inline(always)]
     fn actuate(&mut self, requested: T) -> MotorCommand<T> {
-        let (applied, drive) = match &self.table.drive {
-            DriveMap::Force(force) => {
-                let limited = saturate(requested, force.limit_n);
-                (limited, Drive::Force(limited.to_f32()))
+        match &self.table.drive {
+            DriveMap::Force(force) => self.impose(force, requested),
+            drive => self.convert(drive, requested),
+        }
+    }
+
+    // Out of line: a rig that imposes a force does not pay for motors and pulses.
+    #[inline(never)]
+    fn convert(&mut self, drive: &DriveMap<T>, requested: T) -> MotorCommand<T> {
+        match drive {
+            DriveMap::Force(force) => self.impose(force, requested),
+            DriveMap::Volts(motor) => {
+                let (applied, drive) = self.drive_motor(motor, requested);
+                self.applied = applied;
+                MotorCommand { requested_n: requested, applied_n: applied, drive }
             }
-            DriveMap::Volts(motor) => self.drive_motor(motor, requested),
-            DriveMap::Pulses(steps) => return self.step(steps, requested),
-        };
-        self.applied = applied;
-        MotorCommand { requested_n: requested, applied_n: applied, drive }
+            DriveMap::Pulses(steps) => self.step(steps, requested),
+        }
+    }
+
+    #[inline(always)]
+    fn impose(&mut self, force: &ForceMap<T>, requested: T) -> MotorCommand<T> {
+        let limited = saturate(requested, force.limit_n);
+        self.applied = limited;
+        MotorCommand { requested_n: requested, applied_n: limited, drive: Drive::Force(limited.to_f32()) }
     }
 
     /// The force that a motor's voltage gives at the cart's speed (N), and its command.

@@ -22,11 +22,12 @@ pub struct Defective<'a> {
 }
 
 impl Defect {
-    /// Whether a person can start it while the rig balances: it changes what the firmware reads or drives, not parts
-    /// of the board.
+    /// Whether a person can start it while the rig balances: it changes what the firmware reads or drives, or stops
+    /// its program, but changes no parts of the board.
     pub fn can_begin_while_balancing(self) -> bool {
         let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
-        !is_before_balancing && !matches!(self.needs(), Needs::Process | Needs::Board)
+        let stops_program = matches!(self, Self::Panic | Self::HardFault | Self::StackOverflow);
+        !is_before_balancing && (stops_program || !matches!(self.needs(), Needs::Process | Needs::Board))
     }
 
     /// Whether it is in one of the sensors.

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use upright::supervision::supervisor::State;
 use upright_closed_loop::conversation::words;
-use upright_closed_loop::defects::{Defect, Expected, Ticks};
+use upright_closed_loop::defects::{Defect, Expected, Needs, Ticks};
 use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 
@@ -97,6 +97,8 @@ fn must(kind: Defect) -> String {
 
 /// The defects that a person can begin in a rig with this table, whose firmware runs in this process.
 pub fn breakable(table: &TableValues) -> Vec<Defect> {
-    let can_begin = |kind: &Defect| kind.is_possible(table) && kind.can_begin_while_balancing();
+    let can_begin = |kind: &Defect| {
+        kind.is_possible(table) && kind.can_begin_while_balancing() && kind.needs() != Needs::Board
+    };
     Defect::ALL.iter().copied().filter(can_begin).collect()
 }

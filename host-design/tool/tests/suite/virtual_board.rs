@@ -189,7 +189,7 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
     let error = build(named("feather-f405").unwrap()).unwrap_err().to_string();
     assert_eq!(
         error,
-        "feather-f405 counts 2 encoders, and this rig has 5: use another board (docs/board.md)"
+        "feather-f405 counts 2 encoders, and this rig has 5: use another board (`upright firmware boards`)"
     );
 }
 
