@@ -31,8 +31,8 @@ struct Largest {
 }
 
 /// The largest values as measured, by the compiler: it decides what is inlined into the part of the tick that is
-/// compiled for size. The longest task is that of a tick that obeys a command with the motor off. A change that makes one
-/// of them a tenth larger has to say so here.
+/// compiled for size. The longest task is that of a tick that obeys a command with the motor off. A change that makes
+/// one of them a tenth larger has to say so here.
 const MEASURED: [(&str, Largest); 2] = [
     (
         "rustc 1.95",
