@@ -35,15 +35,15 @@ fn place_of(names: Vec<String>, known: &mut HashMap<String, CodePlace>) -> CodeP
 fn part_of(path: &str) -> Option<TickPart> {
     let is =
         |owner: &str, names: &[&str]| path.contains(owner) && names.iter().any(|name| path.ends_with(name));
-    if is("F4Board", &["::inputs"]) {
+    if is("F4Hardware", &["::inputs"]) {
         Some(TickPart::Inputs)
-    } else if is("F4Board", &["::drive"]) {
+    } else if is("F4Hardware", &["::drive"]) {
         Some(TickPart::Output)
     } else if is("firmware::Firmware", &["::accept", "::act"]) {
         Some(TickPart::Control)
     } else if is("firmware::Firmware", &["::report", "::predict", "::complete"])
         || path.contains("protocol::queue")
-        || is("F4Board", &["::end_tick", "::feed_watchdog"])
+        || is("F4Hardware", &["::end_tick", "::feed_watchdog"])
     {
         Some(TickPart::Rest)
     } else {
@@ -55,7 +55,7 @@ fn part_of(path: &str) -> Option<TickPart> {
 fn is_controller(path: &str) -> Option<bool> {
     if path.contains("control::controller::Controller") {
         Some(true)
-    } else if ["firmware::", "supervision::", "F4Board"].iter().any(|other| path.contains(other)) {
+    } else if ["firmware::", "supervision::", "F4Hardware"].iter().any(|other| path.contains(other)) {
         Some(false)
     } else {
         None
