@@ -60,7 +60,6 @@ const STANDARD_ENCODERS: [(Pin, Pin); 5] = [
     (pin('B', 6), pin('B', 7)),
     (pin('C', 6), pin('C', 7)),
 ];
-const FEATHER_ENCODERS: [(Pin, Pin); 2] = [(pin('C', 6), pin('C', 7)), (pin('B', 6), pin('B', 7))];
 
 impl BoardWiring {
     /// The standard wiring, tabulated in docs/board.md.
@@ -81,26 +80,6 @@ impl BoardWiring {
             wiper_channel: Some(1),
             supply_divider: 23.0,
             reference_v: 3.3,
-        };
-        &WIRING
-    }
-
-    /// The wiring of the Feather, tabulated in docs/board.md.
-    pub const fn feather() -> &'static Self {
-        const WIRING: BoardWiring = BoardWiring {
-            encoders: &FEATHER_ENCODERS,
-            angle_bus: None,
-            pwm: pin('B', 13),
-            direction: pin('B', 9),
-            enable: pin('B', 14),
-            driver_fault: pin('B', 15),
-            emergency_stop: pin('A', 6),
-            limits: [pin('C', 4), pin('C', 5)],
-            tick: pin('B', 8),
-            receive: pin('B', 11),
-            usart: 3,
-            wiper_channel: None,
-            ..*BoardWiring::upright()
         };
         &WIRING
     }

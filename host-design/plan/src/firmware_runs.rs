@@ -13,7 +13,7 @@ use super::SwingUpError;
 use super::closed_loop::deviation;
 use super::demonstration::{hang, up_and_down};
 use super::robustness::{MotionSpread, RandomRuns, TELEMETRY_TICKS, drawn};
-use upright_closed_loop::harness::{BeforeIt, Goals, HarnessError, Target, World, until, with_firmware};
+use upright_closed_loop::harness::{BeforeMotion, Goals, HarnessError, Target, World, until, with_firmware};
 use upright_design::motion::{RaiseAndLower, Transition};
 use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
 use upright_design::simulate::Scenario;
@@ -209,7 +209,7 @@ fn raised_and_lowered(
     world.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = (scenario.duration_s / rig.tick.period_s).round() as usize;
     let mut reached = Reached::default();
-    let mut watch = BeforeIt(|world: &mut World<'_>, _: &mut Output| {
+    let mut watch = BeforeMotion(|world: &mut World<'_>, _: &mut Output| {
         let (tick, lowered) = (world.ticks(), world.goals.begun().first().copied());
         if tick > last + lowered.map_or(0, |from| from - lower_at) {
             return until(true);

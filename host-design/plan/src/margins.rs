@@ -9,7 +9,7 @@ use upright::table::Equilibrium;
 use super::SwingUpError;
 use super::demonstration::{hang, up_and_down};
 use super::robustness::TELEMETRY_TICKS;
-use upright_closed_loop::harness::{BeforeIt, Goals, HarnessError, Target, World, until, with_firmware};
+use upright_closed_loop::harness::{BeforeMotion, Goals, HarnessError, Target, World, until, with_firmware};
 use upright_design::motion::Transition;
 use upright_design::parallel;
 use upright_design::plant::absolute_angles;
@@ -163,7 +163,7 @@ fn arrival(
     };
     let (is_up, in_motion) = (transition == Transition::Up, motion_ticks(table, transition));
     let mut arrived = None;
-    let mut pushing = BeforeIt(|world: &mut World<'_>, output: &mut Output| {
+    let mut pushing = BeforeMotion(|world: &mut World<'_>, output: &mut Output| {
         let tick = world.ticks();
         let begin = if is_up { Some(0) } else { world.goals.begun().first().copied() };
         let latest = world.goals.tick_of(0).map(|at| at + in_ticks(LONGEST_WAIT_S));

@@ -8,7 +8,7 @@ use upright::table::Equilibrium;
 
 use super::SwingUpError;
 use super::robustness::{MotionSpread, TELEMETRY_TICKS, drawn};
-use upright_closed_loop::harness::{BeforeIt, Goals, HarnessError, Target, World, until, with_firmware};
+use upright_closed_loop::harness::{BeforeMotion, Goals, HarnessError, Target, World, until, with_firmware};
 use upright_design::motion::{Transition, rest};
 use upright_design::plant::{absolute_angles, without_turns};
 use upright_design::rig::Rig;
@@ -243,7 +243,7 @@ fn along_route(
     world.session.send(Request::Telemetry(TELEMETRY_TICKS));
     let last = (route.duration_s / rig.tick.period_s) as usize;
     let mut run = RouteRun::default();
-    let mut watch = BeforeIt(|world: &mut World<'_>, _: &mut Output| {
+    let mut watch = BeforeMotion(|world: &mut World<'_>, _: &mut Output| {
         run.fault = world.session.fault().map(|fault| fault.to_string());
         let ends = world.goals.tick_of(run.arrived).unwrap_or(last);
         if world.ticks() + 1 < ends || run.arrived >= route.transitions.len() {

@@ -32,4 +32,4 @@ pub use rail_ends::RailEnds;
 pub use record::{FirmwareTick, Recording, record};
 pub use session::Session;
 pub use target::{Pace, Pins, Target, healthy};
-pub use world::{BeforeIt, Flow, Participant, World, until};
+pub use world::{BeforeMotion, Flow, Participant, World, until};

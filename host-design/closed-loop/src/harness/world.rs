@@ -83,9 +83,9 @@ impl<P: Participant> Participant for Option<P> {
 }
 
 /// A participant that is only asked before the rig moves: see [`Participant::act`].
-pub struct BeforeIt<F>(pub F);
+pub struct BeforeMotion<F>(pub F);
 
-impl<F: FnMut(&mut World<'_>, &mut Output) -> Flow> Participant for BeforeIt<F> {
+impl<F: FnMut(&mut World<'_>, &mut Output) -> Flow> Participant for BeforeMotion<F> {
     fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         self.0(world, output)
     }

@@ -5,7 +5,7 @@ use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
 use upright::board::Output;
-use upright_closed_loop::harness::{BeforeIt, Target, World, until};
+use upright_closed_loop::harness::{BeforeMotion, Target, World, until};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
@@ -47,7 +47,7 @@ impl Relay<'_> {
         self.listener.set_nonblocking(true)?;
         let (period_s, mut client, mut failed) = (self.rig.tick.period_s, Some(self.first_client()?), None);
         let begin = Instant::now();
-        let mut line = BeforeIt(|world: &mut World<'_>, output: &mut Output| {
+        let mut line = BeforeMotion(|world: &mut World<'_>, output: &mut Output| {
             client.take_if(|stream| !send(stream, world.session.last_bytes()));
             let due = begin + Duration::from_secs_f64(world.ticks() as f64 * period_s);
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
