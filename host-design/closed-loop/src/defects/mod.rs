@@ -1,8 +1,8 @@
 //! Fault injection: a defect between the rig and the whole firmware, tick by tick.
 //!
 //! A [`Defect`] has an [`Expected`] outcome. A [`Trial`] is a run with one defect, drawn from a seed and its number, so
-//! that any of them can be run again alone. An [`Injection`] changes inputs and outputs in a trial; [`Defective`] does
-//! so in a rig that a person breaks while it runs.
+//! that any of them can be run again alone. [`Defective`] takes part in a run and changes what the firmware reads and
+//! drives.
 //!
 //! ```
 //! use upright_closed_loop::defects::{Defect, Expected};
