@@ -26,7 +26,7 @@ impl Defect {
     /// its program, but changes no parts of the board.
     pub fn can_begin_while_balancing(self) -> bool {
         let is_before_balancing = matches!(self.expected(), Expected::Refused(_));
-        let stops_program = matches!(self, Self::Panic | Self::HardFault | Self::StackOverflow);
+        let stops_program = self.inside_the_microcontroller().is_some();
         !is_before_balancing && (stops_program || !matches!(self.needs(), Needs::Process | Needs::Board))
     }
 

@@ -54,7 +54,7 @@ fn rows_that_do_not_show_the_fastest_mode_are_refused_with_its_period() {
 
 /// Each of them takes a few seconds: run by `.ci/run`.
 #[test]
-#[ignore = "takes a minute"]
+#[ignore = "takes some seconds: CI runs it"]
 fn every_kind_of_rows_that_a_person_records_is_identified() {
     let of = |period_s: f64, is_uneven: bool| Swing::of(1).rows(times(period_s, is_uneven));
     let of_names = |rows: &[Vec<f64>]| table(&names(1), rows);

@@ -300,7 +300,7 @@ fn misread_free_swings_are_refused_with_the_cause() {
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes some seconds: CI runs it"]
 fn every_planted_error_is_refused_or_doubted_with_its_cause() {
     check(of_columns());
     check(of_scales());
@@ -310,7 +310,7 @@ fn every_planted_error_is_refused_or_doubted_with_its_cause() {
 
 /// The negative control: without an error, nothing is refused.
 #[test]
-#[ignore = "takes a minute"]
+#[ignore = "takes some seconds: CI runs it"]
 fn without_a_planted_error_nothing_is_refused() {
     for (name, planted) in
         [("single", swings(Swing::of(1))), ("double", swings(Swing::of(2))), ("shaken", shaken())]

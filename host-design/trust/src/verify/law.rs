@@ -47,7 +47,7 @@ pub struct LawTrust {
 
 impl LawTrust {
     /// A report with the linear part only.
-    pub(super) fn of(linear: LinearReport) -> Self {
+    pub fn linear_only(linear: LinearReport) -> Self {
         Self {
             linear,
             attraction: None,
@@ -74,7 +74,7 @@ pub(super) fn law_trust(
     let stage = |name| progress(ProgressStep::Begin(name, 1));
     let law = linear.law;
     let is_chain = rig.chain().is_some();
-    let mut trust = LawTrust::of(linear);
+    let mut trust = LawTrust::linear_only(linear);
     if !trust.linear.stable {
         return Ok(trust);
     }

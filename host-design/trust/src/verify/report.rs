@@ -74,7 +74,7 @@ pub fn trust(
 pub fn brief(rig: &Rig, certified: &Certified, table: &TableValues) -> Result<TrustReport, VerifyError> {
     let mut laws = Vec::new();
     for part in linear(rig, certified, table)? {
-        let mut trust = LawTrust::of(part);
+        let mut trust = LawTrust::linear_only(part);
         if trust.linear.stable {
             trust.noise_run = noise(rig, table, trust.linear.law)?;
         }

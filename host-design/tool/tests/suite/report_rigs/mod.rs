@@ -57,18 +57,7 @@ fn made(
 ) -> Report {
     let certified = design(rig).unwrap();
     let table = TableValues::of(rig, &certified, Gains::Sampled).unwrap();
-    let laws = linear(rig, &certified, &table).unwrap().into_iter().map(|linear| LawTrust {
-        linear,
-        attraction: None,
-        pushes: Vec::new(),
-        noise_run: None,
-        corner_noise: None,
-        coarsest_encoder: None,
-        corners: None,
-        mass_tolerances: Vec::new(),
-        monte_carlo: None,
-        imperfections: Vec::new(),
-    });
+    let laws = linear(rig, &certified, &table).unwrap().into_iter().map(LawTrust::linear_only);
     let trust = TrustReport { laws: laws.collect(), checks: Vec::new() };
     let found = settings.map(|settings| imperfections(rig, &table, Law::Lqr, &settings, &|| ()).unwrap());
     let source = ReportSource {
