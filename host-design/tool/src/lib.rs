@@ -8,6 +8,7 @@
 //! | [`report`] | the HTML page |
 //! | [`image`] | builds firmware images, measures flash, stack and panics |
 //! | [`import`] | rig files from a URDF |
+//! | [`simulator_model`] | the machine as MJCF and URDF |
 //! | [`in_the_loop`] | runs the whole firmware, on the host or as an image on the virtual board |
 //! | [`campaign`] | fault injection |
 //! | [`commission`] | from a wired rig to a balancing one, step by step |
@@ -45,5 +46,6 @@ mod policy;
 pub mod progress;
 pub mod project;
 pub mod report;
+pub mod simulator_model;
 pub mod site;
 pub mod twin;

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::error::ImportError;
 use super::urdf::{Body, Robot, RobotJoint};
+use crate::simulator_model::TIP;
 
 /// Directions that agree to this sine count as the same.
 const SAME: f64 = 1e-3;
@@ -21,7 +22,7 @@ pub(super) struct Machine<'r> {
 pub(super) struct HingedLink<'r> {
     pub(super) hinge: &'r RobotJoint,
     pub(super) mass_kg: f64,
-    /// Distance to the next hinge (m); `None` for the last link.
+    /// Distance to the next hinge, or to the tip (m); `None` if the file does not say.
     pub(super) length_m: Option<f64>,
     /// Distance of the centre of mass from the hinge (m).
     pub(super) centre_m: f64,
@@ -29,11 +30,13 @@ pub(super) struct HingedLink<'r> {
     pub(super) inertia_kg_m2: f64,
 }
 
-/// What moves together: the joint that it moves in, the body, and the pose of the joint; all in the world's frame.
+/// What moves together: the joint that it moves in, the body, the pose of the joint, and where the tip is; all in the
+/// world's frame.
 struct MovingPart<'r> {
     joint: Option<&'r RobotJoint>,
     pose: Isometry3<f64>,
     body: Body,
+    tip: Option<Vector3<f64>>,
 }
 
 impl MovingPart<'_> {
@@ -103,11 +106,12 @@ fn hinged_link<'r>(
         return Err(without("mass"));
     }
     let from_hinge = in_plane(centre - part.pose.translation.vector);
-    let to_next = next.map(|next| in_plane(next.pose.translation.vector - part.pose.translation.vector));
+    let end = next.map(|next| next.pose.translation.vector).or(part.tip);
+    let to_next = end.map(|end| in_plane(end - part.pose.translation.vector));
     let line = to_next.unwrap_or(from_hinge);
     let length_m = line.norm();
     if length_m < 1e-6 {
-        return Err(without(if next.is_some() {
+        return Err(without(if end.is_some() {
             "length"
         } else {
             "distance from its joint to its centre of mass"
@@ -138,12 +142,14 @@ fn parts(robot: &Robot) -> Result<Vec<MovingPart<'_>>, ImportError> {
     let (mut parts, mut at) = (Vec::new(), Some((None, root, Isometry3::identity())));
     // A chain visits each link once; the bound ends a circle.
     while let Some((joint, link, pose)) = at.take().filter(|_| parts.len() <= robot.links.len()) {
-        let mut body = Body::default();
+        let (mut body, mut tip) = (Body::default(), None);
         let mut moving: Vec<(&RobotJoint, Isometry3<f64>)> = Vec::new();
         let mut fixed = vec![(link, pose)];
         while let Some((link, pose)) = fixed.pop() {
             for one in robot.links.iter().filter(|one| one.name == link) {
                 body = together(body, moved(one.body, pose));
+                let is_tip = one.name == TIP && one.body.mass_kg == 0.0;
+                tip = tip.or(is_tip.then_some(pose.translation.vector));
             }
             for next in robot.joints.iter().filter(|next| next.parent == link) {
                 let pose = pose * next.origin;
@@ -153,7 +159,7 @@ fn parts(robot: &Robot) -> Result<Vec<MovingPart<'_>>, ImportError> {
                 }
             }
         }
-        parts.push(MovingPart { joint, pose, body });
+        parts.push(MovingPart { joint, pose, body, tip });
         match moving[..] {
             [] => {}
             [(next, pose)] => at = Some((Some(next), next.child.as_str(), pose)),

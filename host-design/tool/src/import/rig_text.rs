@@ -8,6 +8,7 @@ use upright_design::rig::Rig;
 
 use super::error::ImportError;
 use super::hinges::Machine;
+use crate::simulator_model::UNLIMITED;
 
 /// Digits of a number from the file; more than any URDF has.
 const DIGITS: usize = 9;
@@ -48,7 +49,7 @@ pub(super) fn rig_text(name: &str, file: &str, machine: &Machine<'_>) -> Result<
             number(link.hinge.friction[0])
         );
     }
-    let [effort, speed] = slide.most;
+    let [effort, speed] = slide.most.map(|most| if most < UNLIMITED { most } else { 0.0 });
     text += "\n[actuator] # missing: the motor\n";
     text += &match effort > 0.0 {
         true => format!("force_limit_n = {}\n", number(effort)),

@@ -13,6 +13,7 @@ mod cycles;
 mod documented_tables;
 mod documents;
 mod equipment;
+mod export_models;
 mod first_power_up;
 mod first_words;
 #[path = "../../../../src/gains.rs"]

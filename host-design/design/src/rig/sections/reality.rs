@@ -202,6 +202,29 @@ impl Default for Reality {
     }
 }
 
+impl Reality {
+    /// Names of the keys whose values are not those of a machine that matches the model.
+    pub fn given_keys(&self) -> impl Iterator<Item = &'static str> {
+        fn given<T: Keys>(values: &T, matching: &T) -> Vec<&'static str> {
+            let pairs = values.values().into_iter().zip(matching.values());
+            let keys = T::KEYS.iter().zip(pairs);
+            keys.filter(|(_, (value, matching))| value != matching).map(|(key, _)| key.name).collect()
+        }
+        let matching = Self::default();
+        [
+            given(&self.friction, &matching.friction),
+            given(&self.air_drag, &matching.air_drag),
+            given(&self.drive_train, &matching.drive_train),
+            given(&self.driver, &matching.driver),
+            given(&self.step_motor, &matching.step_motor),
+            given(&self.sensors, &matching.sensors),
+            given(&self.parameters, &matching.parameters),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
 /// Keys of what lies between a force and the cart.
 fn of_force() -> Vec<&'static str> {
     [DriveTrain::KEYS, DriverErrors::KEYS].concat().iter().map(|key| key.name).collect()
