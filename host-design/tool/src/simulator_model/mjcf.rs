@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use upright_design::rig::{Actuator, Chain, Motor, Rig};
 
-use super::{NoModel, facts, inertia_kg_m2, machine, plain};
+use super::machine::{NoModel, facts, inertia_kg_m2, machine, plain};
 
 /// Longest step of the simulation (s); a tick is a whole number of steps.
 const LONGEST_STEP_S: f64 = 5e-4;

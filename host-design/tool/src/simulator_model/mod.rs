@@ -1,6 +1,6 @@
 //! The machine of a rig file for simulators: MJCF, which MuJoCo reads, and URDF.
 //!
-//! The rail is along x, z points up, and the hinges turn about -y: `slide`, `hinge_1`, … count as the sensors of the rig
+//! The rail is along x, z points up, and the hinges turn about -y: `slide`, `hinge_1`, … have the signs of the rig
 //! file, and each hinge is straight at 0. Masses, lengths and inertias are those of the simulated machine, with
 //! `[reality]`.
 //!
@@ -15,71 +15,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod machine;
 mod mjcf;
 mod urdf;
 
-use upright_design::reality::real_chain;
-use upright_design::rig::{Chain, Link, Rig};
+pub(crate) use machine::{TIP, UNLIMITED};
 
+pub use machine::NoModel;
 pub use mjcf::mjcf;
 pub use urdf::urdf;
-
-/// Name of the link without mass at the end of the last link in a URDF: a URDF has no lengths.
-pub(crate) const TIP: &str = "tip";
-
-/// Force and speed of a URDF's joint that has no limit (N, m/s): the format has no word for that.
-pub(crate) const UNLIMITED: f64 = 1e9;
-
-/// Why a rig has no model for a simulator.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum NoModel {
-    /// It is given by matrices.
-    #[error("[model] has no bodies: describe the machine by [cart] and [[link]]")]
-    NoBodies,
-    /// The mass of the cart is unknown.
-    #[error("mass_kg of [cart] is missing: a URDF needs it, whatever drives the cart")]
-    NoCartMass,
-}
-
-/// The simulated machine's chain.
-fn machine(rig: &Rig) -> Result<Chain, NoModel> {
-    let chain = rig.chain().ok_or(NoModel::NoBodies)?;
-    Ok(real_chain(chain, &rig.reality.parameters))
-}
-
-/// Moment of inertia about the centre of mass (kg·m²).
-fn inertia_kg_m2(link: &Link) -> f64 {
-    link.inertia_kg_m2.unwrap_or(link.mass_kg * link.length_m * link.length_m / 12.0)
-}
-
-/// Lines of an XML comment: each sensor's step, noise and age, the tick, and the keys of `[reality]` that are not among
-/// those `carried`.
-fn facts(rig: &Rig, carried: &[&str]) -> String {
-    let period_s = rig.tick.period_s;
-    let begins = if rig.tick.delay_ticks == 0 { "in its tick" } else { "one tick later" };
-    let mut lines = format!("  A tick is {period_s} s, and its input begins {begins}.\n");
-    for sensor in rig.sensors() {
-        let (joint, unit) = match sensor.state {
-            0 => ("slide".to_owned(), "m"),
-            state => (format!("hinge_{}", state / 2), "rad"),
-        };
-        let (step, delay_s) = (sensor.step::<f64>(), sensor.delay_s);
-        lines += &format!(
-            "  The sensor of {joint}: steps of {step} {unit}, noise {} {unit} rms, {delay_s} s old.\n",
-            sensor.noise
-        );
-    }
-    let left: Vec<&str> = rig.reality.given_keys().filter(|key| !carried.contains(key)).collect();
-    if !left.is_empty() {
-        lines += &format!("  Not in this file, of [reality]: {}.\n", left.join(", "));
-    }
-    lines
-}
-
-/// A rig's name within an XML comment or attribute.
-fn plain(name: &str) -> String {
-    let plain: String =
-        name.chars().map(|c| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' }).collect();
-    // Two hyphens end a comment.
-    plain.replace("--", "__")
-}

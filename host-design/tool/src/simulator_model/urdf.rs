@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use upright_design::rig::Rig;
 
-use super::{NoModel, TIP, UNLIMITED, facts, inertia_kg_m2, machine, plain};
+use super::machine::{NoModel, TIP, UNLIMITED, facts, inertia_kg_m2, machine, plain};
 
 /// Keys of `[reality]` that the file has.
 const CARRIED: &[&str] = &[

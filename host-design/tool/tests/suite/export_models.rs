@@ -1,4 +1,4 @@
-//! `upright export --mjcf` and `--urdf`: MuJoCo computes the plant's accelerations, and `import` reads the machine back.
+//! `upright export --mjcf` and `--urdf`: MuJoCo computes the accelerations of the plant, and `import` reads the machine.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -133,11 +133,8 @@ fn the_recorded_accelerations_are_those_of_the_exported_models() {
         );
     }
     let python = std::env::var("UPRIGHT_PYTHON").unwrap_or("python3".to_owned());
-    let has_mujoco = Command::new(&python).args(["-c", "import mujoco"]).output();
-    if !has_mujoco.is_ok_and(|found| found.status.success()) {
-        eprintln!(
-            "skipped: {python} has no package mujoco; the recorded accelerations are not computed again"
-        );
+    if Command::new(&python).arg("--version").output().is_err() {
+        eprintln!("skipped: no {python}; the recorded accelerations are not computed again");
         return;
     }
     // MuJoCo writes a log into the folder that it runs in.
@@ -145,7 +142,14 @@ fn the_recorded_accelerations_are_those_of_the_exported_models() {
     let mut command = Command::new(&python);
     command.current_dir(&elsewhere).arg(folder().join("accelerations.py")).args(&files);
     let computed = output(&mut command);
-    assert!(computed.status.success(), "{}", String::from_utf8_lossy(&computed.stderr));
+    let errors = String::from_utf8_lossy(&computed.stderr);
+    if errors.contains("No module named 'mujoco'") {
+        eprintln!(
+            "skipped: {python} has no package mujoco; the recorded accelerations are not computed again"
+        );
+        return;
+    }
+    assert!(computed.status.success(), "{errors}");
     let text = String::from_utf8(computed.stdout).unwrap();
     let file = folder().join("accelerations.csv");
     if is_blessing {

@@ -16,9 +16,9 @@ use crate::variation::with_table;
 /// The C header contains table and controller, for Arduino, Teensy, ESP32 or a PC. Its results are those of the
 /// firmware's balancing, bit for bit. Its first lines say how to use it, and what it does not protect against.
 ///
-/// MJCF, for MuJoCo, has masses, inertias, viscous and dry friction, motor and ends of the rail of the simulated machine
-/// with its [reality]; a URDF has no motor. Comments say what the format has no word for. Exit status 2 for a rig that
-/// cannot be written.
+/// MJCF, for MuJoCo, has masses, inertias, viscous and dry friction, motor and ends of the rail of the simulated
+/// machine with its [reality]; a URDF has no motor. Comments say what the format has no word for. Exit status 2 for a
+/// rig that cannot be written.
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
