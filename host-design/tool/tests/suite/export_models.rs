@@ -1,4 +1,4 @@
-//! `upright export --mjcf` and `--urdf`: MuJoCo computes the accelerations of the plant, and `import` reads the machine.
+//! `upright export --mjcf` and `--urdf`: MuJoCo computes the same accelerations, and `import` reads the machine.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
