@@ -41,6 +41,7 @@ fn machine() -> ChainModel<LINKS> {
         reaction: a,
         cart_friction: 0.0,
         joint_frictions: SVector::zeros(),
+        turning: None,
     }
 }
 

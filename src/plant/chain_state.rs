@@ -2,7 +2,8 @@
 
 use crate::numbers::{Number, Scalar};
 
-/// State of a chain in absolute angles. A state's rate of change has the same type.
+/// State of a chain in absolute angles. A state's rate of change has the same type. On an arm, the angle of the arm
+/// takes the place of the cart's position (rad, rad/s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainState<const N: usize, T = f32> {
     /// Position of the cart (m).

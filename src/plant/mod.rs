@@ -1,5 +1,5 @@
-//! The nonlinear equations of motion of links on a cart: one source for the firmware, which predicts with them in
-//! `f32`, and for the host, which simulates with them in `f64`.
+//! The nonlinear equations of motion of links on a cart or an arm: one source for the firmware, which predicts with
+//! them in `f32`, and for the host, which simulates with them in `f64`.
 //!
 //! Other modules use states with relative angles, `x, ẋ, θ_1, θ̇_1, …`. The equations here use absolute angles
 //! `φ_i = θ_1 + … + θ_i`, in which the mass matrix is simple.
@@ -19,6 +19,7 @@
 //!     reaction: Vector1::new(0.5),
 //!     cart_friction: 0.0,
 //!     joint_frictions: Vector1::new(0.0),
+//!     turning: None,
 //! };
 //! let mut state = [0.0, 0.0, 0.1, 0.0]; // cart at rest, link leaning by 0.1 rad
 //! rod.predict(&mut state, 0.0, 0.001);

@@ -37,7 +37,7 @@ mod swing_up;
 mod thresholds;
 
 pub use crate::numbers::{Number, Scalar};
-pub use chain_model::ChainModel;
+pub use chain_model::{ChainModel, Turning};
 pub use checksum::ChecksumScan;
 pub use columns::columns;
 pub use drive::DriveMap;

@@ -324,6 +324,7 @@ fn swing_up<'t>(reference: &'t [i16], filter: &'t [i16]) -> SwingUpTable<'t, 2, 
             reaction: SVector::repeat(0.1),
             cart_friction: 0.0,
             joint_frictions: SVector::repeat(0.0),
+            turning: Some(Turning { beta: SMatrix::repeat(0.2), reaction: 1.0 }),
         },
         limits: MotionLimits {
             deviation_rad: 0.35,

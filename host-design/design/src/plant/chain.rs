@@ -1,10 +1,10 @@
-//! The nonlinear equations of motion of N links on a cart, in `f64`.
+//! The nonlinear equations of motion of N links on a cart or an arm, in `f64`.
 
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
 
 use nalgebra::{SMatrix, SVector};
-use upright::table::{ChainModel, Number};
+use upright::table::{ChainModel, Number, Turning};
 
 use super::{ChainParameters, PlantError};
 use crate::rig::{self, CartInput};
@@ -28,8 +28,8 @@ impl Energy {
     }
 }
 
-/// Equations of motion of N links on a cart: those of [`ChainParameters`] with the same symbols, arranged for speed.
-/// The firmware's prediction uses the same source code, in `f32`.
+/// Equations of motion of N links on a cart or an arm: those of [`ChainParameters`] with the same symbols, arranged for
+/// speed. The firmware's prediction uses the same source code, in `f32`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainPlant<const N: usize> {
     total_mass: f64,
@@ -49,12 +49,16 @@ impl<const N: usize> ChainPlant<N> {
         let mut model = ChainModel {
             inverse_mass: 1.0 / mt,
             a: SVector::from_fn(|j, _| a[j]),
-            weight: SVector::from_fn(|j, _| parameters.gravity * a[j]),
+            weight: SVector::from_fn(|j, _| parameters.weight[j]),
             b: SMatrix::from_fn(|j, k| b[(j, k)]),
             b_reduced: SMatrix::from_fn(|j, k| b[(j, k)] - a[j] * a[k] / mt),
             reaction: SVector::from_fn(|j, _| a[j]),
             cart_friction: parameters.cart_friction,
             joint_frictions: SVector::from_fn(|j, _| parameters.joint_frictions[j]),
+            turning: parameters.turning.as_ref().map(|beta| Turning {
+                beta: SMatrix::from_fn(|j, k| beta[(j, k)]),
+                reaction: if parameters.input == CartInput::Force { 1.0 } else { 0.0 },
+            }),
         };
         if parameters.input == CartInput::Acceleration {
             (model.inverse_mass, model.cart_friction) = (1.0, 0.0);
@@ -109,6 +113,13 @@ impl<const N: usize> ChainPlant<N> {
             kinetic -= v * self.model.a[j] * cos[j] * w[j];
             for k in 0..N {
                 kinetic += 0.5 * self.model.b[(j, k)] * (cos[j] * cos[k] + sin[j] * sin[k]) * w[j] * w[k];
+            }
+        }
+        if let Some(turning) = &self.model.turning {
+            for j in 0..N {
+                for k in 0..N {
+                    kinetic += 0.5 * turning.beta[(j, k)] * (v * sin[j]) * (v * sin[k]);
+                }
             }
         }
         Energy { kinetic, potential }

@@ -3,7 +3,7 @@
 // The indices are those of the equations, and all are below N.
 #![allow(clippy::needless_range_loop)]
 
-use upright::table::Number;
+use upright::table::{Number, Turning};
 
 use super::{ChainPlant, WideChainState};
 
@@ -91,10 +91,14 @@ impl<const N: usize> ChainPlant<N> {
                 links[j - 1].phidot[j - 1] -= friction;
             }
         }
+        let mut inverse_mass = model.inverse_mass;
+        if let Some(turning) = &model.turning {
+            inverse_mass = self.add_turning(turning, state, rate, &mut cart, &mut links);
+        }
         // Eliminate the cart's equation: S φ̈ = r, as in `derivative`.
         let mut s = mass;
         for j in 0..N {
-            let share = model.a[j] * cos[j] * model.inverse_mass;
+            let share = model.a[j] * cos[j] * inverse_mass;
             links[j].add(share, &cart);
             for k in 0..N {
                 s[j][k] -= share * model.reaction[k] * cos[k];
@@ -104,8 +108,39 @@ impl<const N: usize> ChainPlant<N> {
         for k in 0..N {
             cart.add(model.reaction[k] * cos[k], &links[k]);
         }
-        cart.scale(model.inverse_mass);
+        cart.scale(inverse_mass);
         (cart, links)
+    }
+
+    /// Adds what the turning of an arm changes in the right-hand sides; returns 1 / (M_t + h).
+    fn add_turning(
+        &self,
+        turning: &Turning<N, f64>,
+        state: &WideChainState<N>,
+        rate: &WideChainState<N>,
+        arm: &mut Partials<N>,
+        links: &mut [Partials<N>; N],
+    ) -> f64 {
+        let (sin, cos) = f64::sines_and_cosines(&state.phi);
+        let (v, w) = (state.xdot, &state.phidot);
+        let mut h = 0.0;
+        for j in 0..N {
+            let (mut p, mut along) = (0.0, 0.0);
+            for k in 0..N {
+                let beta = turning.beta[(j, k)];
+                p += beta * sin[k];
+                along += beta * cos[k] * w[k];
+                links[j].phi[k] += v * v * beta * cos[j] * cos[k];
+            }
+            h += p * sin[j];
+            links[j].phi[j] -= v * v * p * sin[j];
+            links[j].xdot += 2.0 * v * p * cos[j];
+            let slowing = cos[j] * along - p * sin[j] * w[j];
+            arm.phi[j] -= turning.reaction * 2.0 * (v * slowing + p * cos[j] * rate.xdot);
+            arm.phidot[j] -= turning.reaction * 2.0 * v * p * cos[j];
+            arm.xdot -= turning.reaction * 2.0 * p * cos[j] * w[j];
+        }
+        1.0 / (1.0 / self.model().inverse_mass + turning.reaction * h)
     }
 }
 
@@ -134,13 +169,20 @@ fn solve<const N: usize>(mut s: [[f64; N]; N], rows: &mut [Partials<N>; N]) {
 mod tests {
     use super::*;
     use crate::plant::ChainParameters;
-    use crate::rig::Rig;
+    use crate::rig::{Base, CartInput, Chain, Rig};
     use std::path::Path;
 
     #[test]
     fn partial_derivatives_agree_with_differences() {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
-        let chain = rig.chain().unwrap();
+        let cart = rig.chain().unwrap().clone();
+        let mut arm = Chain { base: Base::Arm { radius_m: 0.3 }, ..cart.clone() };
+        arm.links[1].axial_inertia_kg_m2 = 1e-3;
+        let moved = Chain { input: CartInput::Acceleration, ..arm.clone() };
+        [cart, arm, moved].iter().for_each(agree_with_differences);
+    }
+
+    fn agree_with_differences(chain: &Chain) {
         let plant = ChainPlant::<3>::new(&ChainParameters::of(chain)).unwrap();
         let state = WideChainState { x: 0.1, xdot: -0.7, phi: [2.0, -1.1, 0.4], phidot: [3.0, -5.0, 1.5] };
         let (force, torques) = (17.0, [0.3, -0.2, 0.1]);

@@ -48,7 +48,7 @@ pub fn linearise<R: Real>(
     }
     causes[(0, inputs)] = R::one();
     for j in 1..=n {
-        let gravity_torque = sigma[j - 1].clone() * &parameters.gravity * &parameters.a[j - 1];
+        let gravity_torque = sigma[j - 1].clone() * &parameters.weight[j - 1];
         for i in 1..=j {
             causes[(j, i - 1)] = gravity_torque.clone();
         }

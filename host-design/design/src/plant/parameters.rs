@@ -22,6 +22,21 @@ use crate::rig::{self, CartInput};
 /// ```
 ///
 /// Where the drive imposes the cart's acceleration a, `ẍ = a` takes the place of the first equation.
+///
+/// On an arm, x is its angle, forces are torques about its axis, and masses of the base are moments of inertia about
+/// it. Link i turns in a plane at the distance `r_i` from the axis and has the moment of inertia `I'_i` about its own
+/// length. Then
+///
+/// ```text
+/// M_t = (inertia of the arm) + Σ_i (m_i r_i² + I'_i),   a_j = Σ_i m_i r_i h_ij,   V = g Σ_ij m_i h_ij cos φ_j,
+/// ```
+///
+/// the kinetic energy has the further term `½ ẋ² Σ_jk β_jk sin φ_j sin φ_k`, `β_jk = b_jk - δ_jk I'_j`, and with
+/// `p_j = Σ_k β_jk sin φ_k` the left sides have the further terms
+///
+/// ```text
+/// Σ_j p_j (sin φ_j ẍ + 2 cos φ_j φ̇_j ẋ)   and   -p_j cos φ_j ẋ²
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainParameters<R> {
     /// What the drive imposes on the cart.
@@ -30,6 +45,8 @@ pub struct ChainParameters<R> {
     pub total_mass: R,
     /// `a_j`, n entries (kg·m).
     pub a: Vec<R>,
+    /// `g Σ_i m_i h_ij`, n entries (N·m).
+    pub weight: Vec<R>,
     /// `b_jk`, n×n, symmetric (kg·m²).
     pub b: Matrix<R>,
     /// `g` (m/s²).
@@ -38,6 +55,8 @@ pub struct ChainParameters<R> {
     pub cart_friction: R,
     /// `d_i`: viscous friction of each joint on its relative rate, n entries (N·m·s/rad).
     pub joint_frictions: Vec<R>,
+    /// `β_jk`, n×n, symmetric (kg·m²); none on a cart.
+    pub turning: Option<Matrix<R>>,
 }
 
 impl<R: Real> ChainParameters<R> {
@@ -60,15 +79,35 @@ impl<R: Real> ChainParameters<R> {
             None => mass[j].clone() * &length[j] * &length[j] / &R::from_f64(12.0),
         };
         let cart_kg = chain.cart.mass_kg.unwrap_or_default();
+        let axial = |i: usize| R::from_f64(chain.links[i].axial_inertia_kg_m2);
+        let radius = |i: usize| chain.radius_m(i).map(R::from_f64);
+        let of_base = |i: usize| match radius(i) {
+            None => mass[i].clone(),
+            Some(r) => mass[i].clone() * &r * &r + &axial(i),
+        };
+        let moment = |i: usize, j: usize| h(i, j) * &mass[i];
+        let coupling = |i: usize, j: usize| match radius(i) {
+            None => moment(i, j),
+            Some(r) => moment(i, j) * &r,
+        };
+        let second_moments = |of_rotation: &dyn Fn(usize) -> R| {
+            Matrix::from_fn(n, n, |j, k| {
+                let of_rotation = if j == k { of_rotation(j) } else { R::zero() };
+                (j.max(k)..n).fold(of_rotation, |sum, i| sum + &(h(i, j) * &h(i, k) * &mass[i]))
+            })
+        };
+        let over_links = |of: &dyn Fn(usize, usize) -> R| -> Vec<R> {
+            (0..n).map(|j| (j..n).fold(R::zero(), |sum, i| sum + &of(i, j))).collect()
+        };
+        let gravity = R::from_f64(chain.gravity_m_per_s2);
         Self {
             input: chain.input,
-            total_mass: mass.iter().fold(R::from_f64(cart_kg), |sum, m| sum + m),
-            a: (0..n).map(|j| (j..n).fold(R::zero(), |sum, i| sum + &(h(i, j) * &mass[i]))).collect(),
-            b: Matrix::from_fn(n, n, |j, k| {
-                let of_rotation = if j == k { inertia(j) } else { R::zero() };
-                (j.max(k)..n).fold(of_rotation, |sum, i| sum + &(h(i, j) * &h(i, k) * &mass[i]))
-            }),
-            gravity: R::from_f64(chain.gravity_m_per_s2),
+            total_mass: (0..n).fold(R::from_f64(cart_kg), |sum, i| sum + &of_base(i)),
+            a: over_links(&coupling),
+            weight: over_links(&moment).into_iter().map(|moment| gravity.clone() * &moment).collect(),
+            b: second_moments(&inertia),
+            turning: (!chain.base.is_cart()).then(|| second_moments(&|j| inertia(j) - &axial(j))),
+            gravity,
             cart_friction: R::from_f64(chain.cart.friction_n_s_per_m),
             joint_frictions: chain
                 .links
@@ -83,6 +122,15 @@ impl<R: Real> ChainParameters<R> {
         self.a.len()
     }
 
+    /// `Σ_jk β_jk sin φ_j sin φ_k` at the absolute angles `phi` (kg·m²): what links that lean add to the inertia of
+    /// their arm.
+    fn inertia_of_leaning(&self, phi: &[R]) -> R {
+        let Some(beta) = &self.turning else { return R::zero() };
+        let sines: Vec<R> = phi.iter().map(Real::sin).collect();
+        let each = (0..self.links()).flat_map(|j| (0..self.links()).map(move |k| (j, k)));
+        each.fold(R::zero(), |sum, (j, k)| sum + &(beta[(j, k)].clone() * &sines[j] * &sines[k]))
+    }
+
     /// The mass matrix in `x, φ_1, …, φ_n` at the absolute angles `phi` (n entries, rad): (n+1)×(n+1),
     ///
     /// ```text
@@ -90,6 +138,7 @@ impl<R: Real> ChainParameters<R> {
     /// [ -a_j cos φ_j    b_jk cos(φ_j - φ_k)    ]
     /// ```
     ///
+    /// On an arm, its first entry is larger by `Σ_jk β_jk sin φ_j sin φ_k`.
     /// Its first row is 1, 0, … if the drive imposes the cart's acceleration.
     ///
     /// # Panics
@@ -100,7 +149,7 @@ impl<R: Real> ChainParameters<R> {
         Matrix::from_fn(self.links() + 1, self.links() + 1, |row, column| match (row, column) {
             (0, 0) if is_imposed => R::one(),
             (0, _) if is_imposed => R::zero(),
-            (0, 0) => self.total_mass.clone(),
+            (0, 0) => self.total_mass.clone() + &self.inertia_of_leaning(phi),
             (0, j) | (j, 0) => coupling(j - 1),
             (j, k) => (phi[j - 1].clone() - &phi[k - 1]).cos() * &self.b[(j - 1, k - 1)],
         })

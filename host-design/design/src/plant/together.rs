@@ -6,7 +6,7 @@
 use nalgebra::{ArrayStorage, SMatrix, SVector};
 use pulp::{Arch, Simd, WithSimd};
 use upright::plant::ChainState;
-use upright::table::ChainModel;
+use upright::table::{ChainModel, Turning};
 
 use super::lanes::Lanes;
 use super::rk4::rk4;
@@ -69,6 +69,10 @@ struct Chains<const N: usize> {
     reaction: [LaneRow; N],
     cart_friction: LaneRow,
     joint_frictions: [LaneRow; N],
+    turning: [[LaneRow; N]; N],
+    turning_reaction: LaneRow,
+    /// Whether any of the chains is on an arm.
+    turns: bool,
     state: ChainState<N, LaneRow>,
     force: LaneRow,
     torques: [LaneRow; N],
@@ -89,6 +93,9 @@ impl<const N: usize> Together<N> {
                 reaction: [row; N],
                 cart_friction: row,
                 joint_frictions: [row; N],
+                turning: [[row; N]; N],
+                turning_reaction: row,
+                turns: false,
                 state: ChainState { x: row, xdot: row, phi: [row; N], phidot: [row; N] },
                 force: row,
                 torques: [row; N],
@@ -109,6 +116,8 @@ impl<const N: usize> Chains<N> {
     fn set_model(&mut self, lane: usize, model: &ChainModel<N, f64>) {
         self.inverse_mass[lane] = model.inverse_mass;
         self.cart_friction[lane] = model.cart_friction;
+        self.turning_reaction[lane] = model.turning.as_ref().map_or(0.0, |turning| turning.reaction);
+        self.turns |= model.turning.is_some();
         for j in 0..N {
             self.a[j][lane] = model.a[j];
             self.weight[j][lane] = model.weight[j];
@@ -118,6 +127,7 @@ impl<const N: usize> Chains<N> {
                 // By columns, as the matrix is stored.
                 self.b[j][k][lane] = model.b[(k, j)];
                 self.b_reduced[j][k][lane] = model.b_reduced[(k, j)];
+                self.turning[j][k][lane] = model.turning.as_ref().map_or(0.0, |turning| turning.beta[(k, j)]);
             }
         }
     }
@@ -211,7 +221,20 @@ impl<const N: usize> Chains<N> {
             reaction: SVector::from_array_storage(ArrayStorage([[zero; N]])),
             cart_friction: Lanes::load(simd, &self.cart_friction, first),
             joint_frictions: SVector::from_array_storage(ArrayStorage([[zero; N]])),
+            turning: None,
         };
+        if self.turns {
+            let mut turning = Turning {
+                beta: SMatrix::from_array_storage(ArrayStorage([[zero; N]; N])),
+                reaction: Lanes::load(simd, &self.turning_reaction, first),
+            };
+            for j in 0..N {
+                for k in 0..N {
+                    turning.beta.data.0[j][k] = Lanes::load(simd, &self.turning[j][k], first);
+                }
+            }
+            model.turning = Some(turning);
+        }
         let mut state = ChainState { x: zero, xdot: zero, phi: [zero; N], phidot: [zero; N] };
         let mut torques = [zero; N];
         for j in 0..N {
@@ -255,23 +278,35 @@ mod tests {
 
     use super::*;
     use crate::plant::chain_plant;
-    use crate::rig::Rig;
+    use crate::rig::{Base, CartInput, Chain, Rig};
 
     #[test]
     fn every_kind_of_vector_that_this_processor_has_gives_the_bits_of_the_plant() {
         let rig = Rig::from_path(Path::new("../../rigs/quadruple-paper.toml")).unwrap();
-        let chain = rig.chain().unwrap();
+        let cart = rig.chain().unwrap();
+        let arm = Chain { base: Base::Arm { radius_m: 0.1 }, ..cart.clone() };
+        let moved = Chain { input: CartInput::Acceleration, ..arm.clone() };
+        // Arms and carts in one vector, too.
+        let chain = |lane: usize| {
+            if lane < 3 {
+                &arm
+            } else if lane == 4 {
+                &moved
+            } else {
+                cart
+            }
+        };
         let start = |lane: usize| [0.1, -0.2, 0.3 * lane as f64, 3.0, -0.3, 1e-3, 2.0, -9.0, 0.0, 0.5];
         let wide = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)];
         for processor in [Arch::Scalar].into_iter().chain(wide.into_iter().flatten()) {
             let mut lanes = Together::<4>::empty(processor);
             for lane in 0..LANES {
-                lanes.place(lane, chain, &start(lane)).unwrap();
+                lanes.place(lane, chain(lane), &start(lane)).unwrap();
                 lanes.push(lane, lane as f64 - 3.0, &[1e-3, -2e-3, 0.0, 1e-4]);
             }
             lanes.advance(1e-2, 20);
             for lane in 0..LANES {
-                let mut plant = chain_plant(chain).unwrap();
+                let mut plant = chain_plant(chain(lane)).unwrap();
                 plant.set_state(&start(lane));
                 plant.advance(lane as f64 - 3.0, &[1e-3, -2e-3, 0.0, 1e-4], 1e-2, 20);
                 let (mut expected, mut found) = ([0.0; 10], [0.0; 10]);

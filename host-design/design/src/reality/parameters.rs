@@ -5,8 +5,7 @@ use rand_pcg::Pcg64;
 
 use crate::rig::{Chain, ParameterErrors};
 
-/// `chain` with the errors of `[reality]`. A given centre of mass moves with the length; the inertia scales with
-/// m l² and then has its own error.
+/// `chain` with the errors of `[reality]`.
 pub fn real_chain(chain: &Chain, errors: &ParameterErrors) -> Chain {
     if *errors == (crate::rig::Reality::default().parameters) {
         return chain.clone();
@@ -22,12 +21,7 @@ pub fn real_chain(chain: &Chain, errors: &ParameterErrors) -> Chain {
     for (index, link) in real.links.iter_mut().enumerate() {
         let mass = factor(errors.link_mass_percent.of_joint(index));
         let length = factor(errors.link_length_percent.of_joint(index));
-        let inertia = factor(errors.link_inertia_percent.of_joint(index)) * mass * length * length;
-        let uniform = link.mass_kg * link.length_m * link.length_m / 12.0;
-        link.inertia_kg_m2 = Some(inertia * link.inertia_kg_m2.unwrap_or(uniform));
-        link.mass_kg *= mass;
-        link.length_m *= length;
-        link.centre_of_mass_m = link.centre_of_mass_m.map(|centre| centre * length);
+        link.scale(mass, length, factor(errors.link_inertia_percent.of_joint(index)));
     }
     real
 }

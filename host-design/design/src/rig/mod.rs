@@ -19,6 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod base;
 pub mod defaults;
 mod describe;
 mod description;
@@ -38,6 +39,7 @@ mod typical;
 mod unusual;
 mod value;
 
+pub use base::Base;
 pub use description::Rig;
 pub use document::key_table;
 pub use edit::RigText;

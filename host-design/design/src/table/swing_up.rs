@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 use upright::table::{
-    ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds, TransitionTable,
+    ChainModel, MotionLimits, MotionTable, SwingUpTable, TABLE_FORMAT, Thresholds, TransitionTable, Turning,
 };
 
 use super::any_size::{MAX_SENSORS, WidestTable};
@@ -241,5 +241,9 @@ fn narrow<const N: usize>(model: &ChainModel<N, f64>) -> ChainModel<N> {
         reaction: vector(&model.reaction),
         cart_friction: model.cart_friction as f32,
         joint_frictions: vector(&model.joint_frictions),
+        turning: model
+            .turning
+            .as_ref()
+            .map(|turning| Turning { beta: matrix(&turning.beta), reaction: turning.reaction as f32 }),
     }
 }

@@ -2,6 +2,7 @@
 
 mod design_properties;
 mod motor;
+mod plant_arm;
 mod plant_equations;
 mod plant_linear_model;
 mod plant_linearisation;

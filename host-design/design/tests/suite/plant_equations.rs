@@ -30,9 +30,10 @@ fn absolute(state: &[f64]) -> (Vec<f64>, Vec<f64>) {
 fn energy_of_masses(chain: &Chain, state: &[f64]) -> f64 {
     let (phi, rate) = absolute(state);
     let mut energy = 0.5 * chain.cart.mass_kg.unwrap() * state[1] * state[1];
-    let (mut joint_height, mut joint_velocity) = (0.0, (state[1], 0.0));
+    let (mut joint_height, mut joint_offset, mut joint_velocity) = (0.0, 0.0, (0.0, 0.0));
     for (i, link) in chain.links.iter().enumerate() {
         let (m, l) = (link.mass_kg, link.length_m);
+        let base_speed = state[1] * chain.radius_m(i).unwrap_or(1.0);
         let c = link.centre_of_mass_m.unwrap_or(l / 2.0);
         let inertia = link.inertia_kg_m2.unwrap_or(m * l * l / 12.0);
         // A point at distance r along the link is at (-r sin φ, r cos φ) from its joint.
@@ -40,9 +41,19 @@ fn energy_of_masses(chain: &Chain, state: &[f64]) -> f64 {
             (joint_velocity.0 - r * phi[i].cos() * rate[i], joint_velocity.1 - r * phi[i].sin() * rate[i])
         };
         let v = velocity(c);
-        energy += 0.5 * m * (v.0 * v.0 + v.1 * v.1) + 0.5 * inertia * rate[i] * rate[i];
+        let along = base_speed + v.0;
+        energy += 0.5 * m * (along * along + v.1 * v.1) + 0.5 * inertia * rate[i] * rate[i];
+        if chain.radius_m(i).is_some() {
+            // The arm turns the centre of mass about its axis at the distance that it has left the links' plane by,
+            // and the link about its length and across it.
+            let (across, axial) = (joint_offset - c * phi[i].sin(), link.axial_inertia_kg_m2);
+            let (about_length, about_side) = (state[1] * phi[i].cos(), state[1] * phi[i].sin());
+            energy += 0.5 * m * (state[1] * across).powi(2);
+            energy += 0.5 * axial * about_length * about_length + 0.5 * inertia * about_side * about_side;
+        }
         energy += m * chain.gravity_m_per_s2 * (joint_height + c * phi[i].cos());
         joint_height += l * phi[i].cos();
+        joint_offset -= l * phi[i].sin();
         joint_velocity = velocity(l);
     }
     energy
@@ -64,7 +75,7 @@ fn largest_energy(chain: &Chain, state: &[f64]) -> f64 {
         .flat_map(|i| (0..speeds.len()).map(move |j| (i, j)))
         .map(|(i, j)| 0.5 * (m[(i, j)] * speeds[i] * speeds[j]).abs())
         .sum();
-    kinetic + p.gravity * p.a.iter().sum::<f64>()
+    kinetic + p.weight.iter().sum::<f64>()
 }
 
 fn is_positive_definite(m: &Matrix<f64>) -> bool {
@@ -144,6 +155,9 @@ proptest! {
         let (phi, w) = absolute(&state);
         let accelerations = absolute(&rate).1;
         let m = p.mass_matrix(&phi);
+        let turning = |j: usize| -> f64 {
+            p.turning.as_ref().map_or(0.0, |beta| (0..n).map(|k| beta[(j, k)] * phi[k].sin()).sum())
+        };
         let tau = |i: usize| if i < n { torques[i] - p.joint_frictions[i] * state[2 * i + 3] } else { 0.0 };
         for row in 0..=n {
             let mut terms: Vec<f64> = (0..n).map(|k| m[(row, k + 1)] * accelerations[k]).collect();
@@ -151,11 +165,13 @@ proptest! {
             match row.checked_sub(1) {
                 None => {
                     terms.extend((0..n).map(|k| p.a[k] * phi[k].sin() * w[k] * w[k]));
+                    terms.extend((0..n).map(|k| 2.0 * state[1] * turning(k) * phi[k].cos() * w[k]));
                     terms.extend([-force, p.cart_friction * state[1]]);
                 }
                 Some(j) => {
+                    terms.push(-state[1] * state[1] * turning(j) * phi[j].cos());
                     terms.extend((0..n).map(|k| p.b[(j, k)] * (phi[j] - phi[k]).sin() * w[k] * w[k]));
-                    terms.extend([-p.gravity * p.a[j] * phi[j].sin(), -tau(j), tau(j + 1)]);
+                    terms.extend([-p.weight[j] * phi[j].sin(), -tau(j), tau(j + 1)]);
                 }
             }
             let (residual, size) = terms.iter().fold((0.0, 0.0), |(sum, size), t| (sum + t, size + t.abs()));

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use upright_design::plant::MotorPlant;
 use upright_design::rig::{
-    Absent, Actuator, Cart, CartInput, Chain, Limits, Link, LinkEncoder, PlantDescription, PolePlacement,
-    Rig, SECTIONS, TOP, Tick, defaults, key_table, unit_in_names,
+    Absent, Actuator, Base, Cart, CartInput, Chain, Limits, Link, LinkEncoder, PlantDescription,
+    PolePlacement, Rig, SECTIONS, TOP, Tick, defaults, key_table, unit_in_names,
 };
 
 const MINIMAL: &str = r#"
@@ -68,6 +68,8 @@ fn the_paper_rig_has_the_papers_values() {
 fn what_is_left_out_gets_its_documented_default() {
     let link = Link {
         sensor_delay_s: 0.0,
+        radius_m: None,
+        axial_inertia_kg_m2: 0.0,
         mass_kg: 0.5,
         length_m: 0.4,
         centre_of_mass_m: None,
@@ -92,6 +94,7 @@ fn what_is_left_out_gets_its_documented_default() {
         name: "minimal".to_owned(),
         plant: PlantDescription::Chain(Chain {
             cart,
+            base: Base::Cart,
             links: vec![link],
             gravity_m_per_s2: 9.81,
             input: CartInput::Force,

@@ -8,7 +8,7 @@ use upright::table::Law;
 use super::error::{VerifyError, within};
 use super::trial::{Horizon, Outcome, disturbed, leaning, trials};
 use upright_design::plant::LANES;
-use upright_design::rig::{Chain, Link, Rig};
+use upright_design::rig::{Chain, Rig};
 use upright_design::simulate::{Disturbance, Scenario};
 use upright_design::study::Study;
 use upright_design::table::TableValues;
@@ -99,8 +99,7 @@ pub struct MonteCarlo {
 
 /// Plant and scenario of the run with this seed.
 ///
-/// Masses and lengths are drawn first; a given centre of mass keeps its share of the length, and the inertia is scaled
-/// with m l² before it gets its own factor.
+/// Masses and lengths are drawn first.
 pub fn sample(rig: &Rig, law: Law, spread: &Spread, seed: u64) -> (Rig, Scenario) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut between = |share: f64| share * random.random_range(-1.0..=1.0);
@@ -125,12 +124,7 @@ fn draw_chain(chain: &mut Chain, spread: &Spread, between: &mut impl FnMut(f64) 
     chain.cart.friction_n_s_per_m *= 1.0 + between(spread.friction);
     for link in &mut chain.links {
         let (mass, length) = (1.0 + between(spread.mass), 1.0 + between(spread.length));
-        let inertia = (1.0 + between(spread.inertia)) * mass * length * length;
-        let Link { mass_kg, length_m, inertia_kg_m2, .. } = link;
-        *inertia_kg_m2 = Some(inertia * inertia_kg_m2.unwrap_or(*mass_kg * *length_m * *length_m / 12.0));
-        *mass_kg *= mass;
-        *length_m *= length;
-        link.centre_of_mass_m = link.centre_of_mass_m.map(|centre| centre * length);
+        link.scale(mass, length, 1.0 + between(spread.inertia));
         link.friction_n_m_s_per_rad *= 1.0 + between(spread.friction);
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::super::base::Base;
 use super::super::error::RigError;
 use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
@@ -66,7 +67,7 @@ keys! {
 /// The plant to balance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum PlantDescription {
-    /// Links on a cart.
+    /// Links on a cart or an arm.
     Chain(Chain),
     /// A linear single-input plant given by its matrices.
     Model(LinearPlant),
@@ -154,11 +155,14 @@ impl Table<'_> {
     }
 }
 
-/// A cart with n >= 1 links.
+/// A cart or an arm with n >= 1 links.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chain {
-    /// The cart.
+    /// The cart, or the arm in its place.
     pub cart: Cart,
+    /// Which of the two it is.
+    #[serde(skip_serializing_if = "Base::is_cart")]
+    pub base: Base,
     /// Links from the cart outwards.
     pub links: Vec<Link>,
     /// Acceleration of gravity (m/s²).
@@ -172,6 +176,14 @@ impl Chain {
     /// Mass of the cart and all links (kg); a cart whose mass is not given counts nothing.
     pub fn total_mass_kg(&self) -> f64 {
         self.cart.mass_kg.unwrap_or_default() + self.links_mass_kg()
+    }
+
+    /// Distance of the plane of link `index`, counted from 0, from the axis of the arm (m); none on a cart.
+    pub fn radius_m(&self, index: usize) -> Option<f64> {
+        match self.base {
+            Base::Cart => None,
+            Base::Arm { radius_m } => Some(self.links.get(index)?.radius_m.unwrap_or(radius_m)),
+        }
     }
 
     /// Mass of all links (kg).
@@ -219,7 +231,7 @@ fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
     let links = entries.iter().enumerate();
     let links = links.map(|(index, entry)| link::link(entry, gravity_m_per_s2, index == 0));
     let links = links.collect::<Result<_, _>>()?;
-    Ok(Chain { cart, links, gravity_m_per_s2, input })
+    Ok(Chain { cart, base: Base::Cart, links, gravity_m_per_s2, input })
 }
 
 /// A force moves a mass; a drive that imposes an acceleration also knows where it has put the cart.

@@ -153,6 +153,12 @@ pub struct Link {
     /// Age of its reading at the tick (s).
     #[serde(skip_serializing_if = "is_zero")]
     pub sensor_delay_s: f64,
+    /// Distance of its plane from an arm's axis (m); the radius of the arm if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
+    /// Moment of inertia about its own length (kg·m²), which turns only with an arm.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub axial_inertia_kg_m2: f64,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
@@ -208,6 +214,8 @@ pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64, is_lowest: bool) -> R
         friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
         encoder: link_encoder(&table, is_lowest)?,
         sensor_delay_s: table.value("sensor_delay_s")?,
+        radius_m: None,
+        axial_inertia_kg_m2: 0.0,
     };
     if let (None, Some(node)) = (link.encoder, table.get("sensor_delay_s")) {
         return Err(
@@ -228,6 +236,17 @@ impl Link {
     /// Distance from the joint to the centre of mass (m), half the length if not given.
     pub fn centre_m(&self) -> f64 {
         self.centre_of_mass_m.unwrap_or(0.5 * self.length_m)
+    }
+
+    /// Makes mass, length and inertia other ones by these factors. A given centre of mass moves with the length; the
+    /// inertia scales with m l², too.
+    pub fn scale(&mut self, mass: f64, length: f64, inertia: f64) {
+        let uniform = self.mass_kg * self.length_m * self.length_m / 12.0;
+        self.inertia_kg_m2 = Some(inertia * mass * length * length * self.inertia_kg_m2.unwrap_or(uniform));
+        self.axial_inertia_kg_m2 *= mass;
+        self.mass_kg *= mass;
+        self.length_m *= length;
+        self.centre_of_mass_m = self.centre_of_mass_m.map(|centre| centre * length);
     }
 
     /// Moment of inertia about the joint (kg·m²), `J + m c²`.
