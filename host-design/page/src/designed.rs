@@ -10,6 +10,7 @@ use upright_design::table::{Gains, NoTable, TableValues};
 use upright_plan::{Stored, motions, with_motions};
 
 use crate::refusal::PageRefusal;
+use crate::survival::survival;
 use crate::trust::ShortTrust;
 
 /// Most points of a curve that a page draws.
@@ -92,11 +93,16 @@ impl DeskDesign {
     /// Every tick of the run that is shown for the law with the name `law`, as `upright simulate --csv` writes it.
     pub(crate) fn csv(&self, rig: &Rig, law: &str, run: &ShownRun) -> Result<String, PageRefusal> {
         let table = self.table()?;
-        let law = table.laws.present().map(|(law, _)| law).find(|present| present.option() == law);
-        let (trace, _) = ran(rig, table, law.ok_or(PageRefusal::Law)?, run)?;
+        let (trace, _) = ran(rig, table, named(table, law)?, run)?;
         let mut bytes = Vec::new();
         trace.write_csv(&mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// How much the loop of the law with this name stands.
+    pub(crate) fn survival(&self, rig: &Rig, law: &str) -> Result<Value, PageRefusal> {
+        let table = self.table()?;
+        Ok(survival(rig, table, named(table, law)?)?)
     }
 
     /// The trust report after the step of this number.
@@ -114,6 +120,12 @@ impl DeskDesign {
         };
         Ok(json!({ "laws": Law::ALL.map(of) }))
     }
+}
+
+/// The law of the table with this name.
+fn named(table: &TableValues, law: &str) -> Result<Law, PageRefusal> {
+    let mut laws = table.laws.present().map(|(law, _)| law);
+    laws.find(|present| present.option() == law).ok_or(PageRefusal::Law)
 }
 
 fn gains(law: &Feedback<f64>) -> Value {

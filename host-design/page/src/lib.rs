@@ -6,6 +6,8 @@
 //! |---|---|
 //! | `question.rs`, `refusal.rs` | what a page asks, and why there may be no answer |
 //! | `sketch.rs`, `designed.rs` | what it shows of a rig, and of its design |
+//! | `changes.rs` | changes of its file: another number of links, the sliders that a person finds first |
+//! | `survival.rs` | how much a loop stands, in two numbers |
 //! | `trust.rs` | the trust report in short form, step by step |
 //! | `lesson.rs` | exercises, and how answers to them are marked |
 //! | `fingerprint.rs` | checksums of tables and of 100 000 ticks of the firmware, to compare machines |
@@ -14,6 +16,7 @@
 
 #![deny(unsafe_code)]
 
+mod changes;
 mod designed;
 #[cfg(target_family = "wasm")]
 mod exported;
@@ -22,6 +25,7 @@ mod lesson;
 mod question;
 mod refusal;
 mod sketch;
+mod survival;
 mod trust;
 pub mod twin;
 

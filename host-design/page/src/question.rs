@@ -8,6 +8,7 @@ use upright_design::export::c_header;
 use upright_design::rig::{Rig, RigText};
 use upright_design::table::gains_source;
 
+use crate::changes::{changed, differences};
 use crate::designed::{DeskDesign, ShownRun};
 use crate::fingerprint::{Fingerprint, PullRounding};
 use crate::lesson::Exercise;
@@ -30,8 +31,13 @@ struct Question {
 enum Asked {
     /// Whether the file is valid, and what it describes.
     Check,
-    /// The text with another value of a key.
-    Set { key: String, value: String },
+    /// The text with other values of some keys, without those that have none; before, with this number of links.
+    Set {
+        #[serde(default)]
+        links: Option<usize>,
+        #[serde(default)]
+        values: Vec<(String, Option<String>)>,
+    },
     /// The gains, and the closed loop in a run of the firmware's controller.
     Design(ShownRun),
     /// That run, tick by tick, as `upright simulate --csv` writes it.
@@ -40,6 +46,10 @@ enum Asked {
         #[serde(flatten)]
         run: ShownRun,
     },
+    /// What differs from another file.
+    Differences { from: String },
+    /// How much the loop of a law stands.
+    Survival { law: String },
     /// The poles of the loops, which take as long as the gains.
     Poles,
     /// The trust report in short form, as far as its step of this number.
@@ -74,11 +84,9 @@ impl Desk {
         let rig = Rig::from_toml(&question.toml, Path::new(FILE))?;
         let motions = question.motions.as_deref();
         match &question.wanted {
-            Asked::Check => Ok(sketch(&rig)),
-            Asked::Set { key, value } => {
-                let mut text = RigText::parse(&question.toml, Path::new(FILE))?;
-                text.set(key, value)?;
-                let text = text.to_string();
+            Asked::Check => Ok(sketch(&rig, &RigText::parse(&question.toml, Path::new(FILE))?)),
+            Asked::Set { links, values } => {
+                let text = changed(&question.toml, *links, values)?;
                 Rig::from_toml(&text, Path::new(FILE))?;
                 Ok(json!({ "toml": text }))
             }
@@ -87,6 +95,8 @@ impl Desk {
                 let text = self.designed(&question.toml, &rig)?.csv(&rig, law, run)?;
                 Ok(json!({ "text": text }))
             }
+            Asked::Differences { from } => Ok(json!({ "differences": differences(from, &question.toml)? })),
+            Asked::Survival { law } => self.designed(&question.toml, &rig)?.survival(&rig, law),
             Asked::Poles => self.designed(&question.toml, &rig)?.poles(&rig),
             &Asked::Verify { step } => self.designed(&question.toml, &rig)?.verify(&rig, step),
             Asked::Mark { exercise, answer } => exercise.marked(&question.toml, answer),
@@ -150,11 +160,11 @@ mod tests {
         };
         let first = gains(&json!(toml));
         assert!((first[0].as_f64().unwrap() - 3.162_277_66).abs() < 1e-6, "{first}");
-        let set = json!({ "ask": "set", "toml": toml, "key": "lqr.force_weight", "value": "2" });
+        let set = json!({ "ask": "set", "toml": toml, "values": [["lqr.force_weight", "2"]] });
         let changed = ask(&set)["toml"].clone();
         assert!(changed.as_str().unwrap().contains("force_weight = 2\n"));
         assert_ne!(gains(&changed), first);
-        let refused = json!({ "ask": "set", "toml": toml, "key": "lqr.force_weight", "value": "-2" });
+        let refused = json!({ "ask": "set", "toml": toml, "values": [["lqr.force_weight", "-2"]] });
         assert!(ask(&refused)["failed"]["why"].as_str().unwrap().contains("force_weight"));
     }
 }

@@ -1,10 +1,12 @@
 //! What a page draws of a rig before it is designed.
 
 use serde_json::{Value, json};
-use upright_design::rig::{LinkEncoder, PlantDescription, Rig};
+use upright_design::rig::{Link, LinkEncoder, PlantDescription, Rig, RigText};
 
-/// Names, lengths and travel; the weights that can be changed while one looks; values that no bench has.
-pub(crate) fn sketch(rig: &Rig) -> Value {
+use crate::changes::dials;
+
+/// Names, lengths and travel; what can be changed while one looks; values that no bench has. `text` is the rig's file.
+pub(crate) fn sketch(rig: &Rig, text: &RigText) -> Value {
     let (lengths_m, travel_m) = match &rig.plant {
         PlantDescription::Chain(chain) => {
             (chain.links.iter().map(|link| link.length_m).collect(), chain.cart.travel_m.map(Some))
@@ -18,12 +20,38 @@ pub(crate) fn sketch(rig: &Rig) -> Value {
         "rig": rig.name,
         "lengths_m": lengths_m,
         "travel_m": travel_m,
+        "drive": drive(rig),
+        "sensors": sensors(rig),
+        "has_observer": rig.kalman.is_some(),
         "states": rig.states(),
         "tick_s": rig.tick.period_s,
+        "dials": dials(rig, text),
         "fields": fields(rig),
         "weights": rig.lqr.as_ref().map(|lqr| json!({ "states": lqr.state_weights, "force": lqr.force_weight })),
         "unusual": rig.unusual_values(),
     })
+}
+
+/// The kind of the drive, of those that a page has pictures of.
+fn drive(rig: &Rig) -> &'static str {
+    match (rig.actuator.pulses(), rig.actuator.motor()) {
+        (Some(_), _) => "stepper",
+        (None, Some(_)) => "motor",
+        (None, None) => "force",
+    }
+}
+
+/// The kind of the links' sensors, if all have the same.
+fn sensors(rig: &Rig) -> Option<&'static str> {
+    let links = rig.chain().map_or(&[][..], |chain| &chain.links);
+    let is_absolute = |link: &Link| matches!(link.encoder, Some(LinkEncoder::Absolute { .. }));
+    if !links.is_empty() && links.iter().all(is_absolute) {
+        Some("absolute")
+    } else if !links.is_empty() && links.iter().all(|link| link.encoder.is_some() && !is_absolute(link)) {
+        Some("encoder")
+    } else {
+        None
+    }
 }
 
 /// The numbers that a page offers as fields: keys of the rig file, with label, unit and value.
@@ -73,8 +101,6 @@ fn fields(rig: &Rig) -> Vec<Value> {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
-
-    use upright_design::rig::RigText;
 
     use super::*;
 

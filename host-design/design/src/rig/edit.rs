@@ -39,12 +39,20 @@ impl RigText {
 
     /// Whether the text gives `key`: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
     pub fn has(&self, key: &str) -> bool {
-        let found = key.split('.').try_fold(self.document.as_item(), |item, step| {
-            let (name, index) = indexed(step);
-            let item = item.get(name)?;
-            index.map_or(Some(item), |index| item.get(index))
-        });
-        found.is_some()
+        found(self.document.as_item(), key).is_some()
+    }
+
+    /// Every key of the text with its value as it is written, in the order of the text: `link[2].mass_kg`, `0.23`.
+    pub fn values(&self) -> Vec<(String, String)> {
+        let mut values = Vec::new();
+        collect(self.document.as_item(), "", &mut values);
+        values
+    }
+
+    /// The number that the text gives `key`; none if it gives none.
+    pub fn number(&self, key: &str) -> Option<f64> {
+        let item = found(self.document.as_item(), key)?;
+        item.as_float().or_else(|| item.as_integer().map(|number| number as f64))
     }
 
     /// Gives `key` this value, in TOML syntax. A key that is missing is added, with its section.
@@ -85,6 +93,38 @@ impl RigText {
         }
     }
 
+    /// Gives the list `key` this many entries, be it an array or sections such as `[[link]]`: each new one is a copy of
+    /// the one `period` entries before it. A list that is not in the text, or has fewer than `period`, stays as it is.
+    pub fn resize(&mut self, key: &str, length: usize, period: usize) {
+        if !self.has(key) {
+            return;
+        }
+        match place(self.document.as_item_mut(), key) {
+            Some(Item::ArrayOfTables(tables)) => {
+                while tables.len() > length.max(1) {
+                    tables.remove(tables.len() - 1);
+                }
+                while tables.len() < length {
+                    let before = tables.len().checked_sub(period).and_then(|number| tables.get(number));
+                    let Some(mut copy) = before.cloned() else { return };
+                    copy.decor_mut().set_prefix("\n");
+                    tables.push(copy);
+                }
+            }
+            Some(Item::Value(Value::Array(array))) => {
+                while array.len() > length {
+                    array.remove(array.len() - 1);
+                }
+                while array.len() < length {
+                    let before = array.len().checked_sub(period).and_then(|number| array.get(number));
+                    let Some(copy) = before.cloned() else { return };
+                    array.push_formatted(copy.decorated(" ", ""));
+                }
+            }
+            _ => {}
+        }
+    }
+
     /// Adds an empty section below all of the text.
     fn add(&mut self, section: &str) {
         let comments = self.document.trailing().as_str().unwrap_or_default().to_owned();
@@ -119,12 +159,35 @@ fn place<'a>(document: &'a mut Item, key: &str) -> Option<&'a mut Item> {
 /// The offset at which `text` gives `key`; none if it does not, or is not TOML.
 pub(super) fn place_in(text: &str, key: &str) -> Option<usize> {
     let document = RigSource { file: Path::new(""), text }.document().ok()?;
-    let found = key.split('.').try_fold(document.as_item(), |item, step| {
+    found(document.as_item(), key)?.span().map(|span| span.start)
+}
+
+/// Adds what stands below `key` in `item`.
+fn collect(item: &Item, key: &str, values: &mut Vec<(String, String)>) {
+    let below = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
+    let number = |index: usize| format!("{key}[{}]", index + 1);
+    if let Some(table) = item.as_table_like() {
+        table.iter().for_each(|(name, inner)| collect(inner, &below(name), values));
+    } else if let Some(tables) = item.as_array_of_tables() {
+        for (index, table) in tables.iter().enumerate() {
+            collect(&Item::Table(table.clone()), &number(index), values);
+        }
+    } else if let Some(tables) = item.as_array().filter(|array| array.iter().any(Value::is_inline_table)) {
+        for (index, table) in tables.iter().enumerate() {
+            collect(&Item::Value(table.clone()), &number(index), values);
+        }
+    } else if let Some(value) = item.as_value() {
+        values.push((key.to_owned(), value.clone().decorated("", "").to_string()));
+    }
+}
+
+/// What stands at `key`; none if nothing does.
+fn found<'a>(document: &'a Item, key: &str) -> Option<&'a Item> {
+    key.split('.').try_fold(document, |item, step| {
         let (name, index) = indexed(step);
         let item = item.get(name)?;
         index.map_or(Some(item), |index| item.get(index))
-    });
-    found?.span().map(|span| span.start)
+    })
 }
 
 /// Splits `name[2]` into the name and the index 1.
@@ -171,6 +234,43 @@ mod tests {
         text.remove("link[3].mass_kg");
         text.remove("motor.mass_kg");
         assert_eq!(text.to_string(), TEXT.replace("mass_kg = 2 # second\n", ""));
+    }
+
+    #[test]
+    fn all_values_are_listed_with_their_keys_however_they_are_written() {
+        let listed = |text: &str| RigText::parse(text, "rig.toml".as_ref()).unwrap().values();
+        let all = |pairs: &[(&str, &str)]| -> Vec<(String, String)> {
+            pairs.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect()
+        };
+        let values = [
+            ("name", "\"a\""),
+            ("link[1].mass_kg", "1"),
+            ("link[2].mass_kg", "2"),
+            ("tick.period_s", "0.001"),
+        ];
+        assert_eq!(listed(TEXT), all(&values));
+        let inline =
+            "link = [ { mass_kg = 1 } ] # one\ntick.period_s = 2\nlqr = { state_weights = [1, 2] }\n";
+        let values = [("link[1].mass_kg", "1"), ("tick.period_s", "2"), ("lqr.state_weights", "[1, 2]")];
+        assert_eq!(listed(inline), all(&values));
+    }
+
+    #[test]
+    fn a_list_grows_by_copies_and_shrinks_from_its_end() {
+        let resized = |text: &str, key: &str, length: usize, period: usize| {
+            let mut text = RigText::parse(text, "rig.toml".as_ref()).unwrap();
+            text.resize(key, length, period);
+            text.to_string()
+        };
+        let third = "mass_kg = 2 # second\n\n[[link]]\nmass_kg = 2 # second\n";
+        assert_eq!(resized(TEXT, "link", 3, 1), TEXT.replace("mass_kg = 2 # second\n", third));
+        assert_eq!(resized(TEXT, "link", 1, 1), TEXT.replace("[[link]]\nmass_kg = 2 # second\n", ""));
+        let array = "[lqr]\nstate_weights = [1, 2, 3, 4] # all\n";
+        assert_eq!(resized(array, "lqr.state_weights", 6, 2), array.replace("4]", "4, 3, 4]"));
+        assert_eq!(resized(array, "lqr.state_weights", 2, 2), array.replace(", 3, 4]", "]"));
+        for (key, period) in [("lqr.far_poles", 1), ("lqr.state_weights", 5), ("lqr", 1)] {
+            assert_eq!(resized(array, key, 6, period), array, "{key}");
+        }
     }
 
     #[test]

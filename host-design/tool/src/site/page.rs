@@ -3,11 +3,11 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 use upright::protocol::BAUD;
-use upright_page::Lesson;
+use upright_page::{Desk, Lesson};
 
 use super::motions::without_knots;
 use super::packed::packed;
-use super::twin::{TwinPage, bare, file};
+use super::twin::{TwinPage, bare, shared};
 use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
 use crate::policy::{base64, source};
 
@@ -15,9 +15,7 @@ const PAGE: &str = include_str!("page/desk.html");
 const STYLE: &str = include_str!("page/desk.css");
 const WORKER: &str =
     concat!(include_str!("page/worker.js"), include_str!("page/running.js"), include_str!("page/talking.js"));
-/// What the desk has of the twin's page.
-const SHARED: [&str; 2] = ["scale.js", "words.js"];
-const SCRIPTS: [&str; 13] = [
+const SCRIPTS: [&str; 18] = [
     include_str!("page/lzma.js"),
     include_str!("page/link.js"),
     include_str!("page/sharing.js"),
@@ -26,12 +24,22 @@ const SCRIPTS: [&str; 13] = [
     include_str!("page/number.js"),
     include_str!("page/past.js"),
     include_str!("page/editor.js"),
+    include_str!("page/panels.js"),
+    include_str!("page/dials.js"),
+    include_str!("page/machine.js"),
+    include_str!("page/compared.js"),
+    include_str!("page/live.js"),
     include_str!("page/serial.js"),
     include_str!("page/balance.js"),
     include_str!("page/lessons.js"),
     include_str!("page/trust.js"),
     include_str!("page/desk.js"),
 ];
+/// Where the twin's page has the modules that the desk has, too, and what stands behind them in the desk's script.
+const SHARED_MARK: &str = "{shared}";
+const SHARED_END: &str = "end of what is shared";
+/// The rig that moves when the page is opened.
+const FIRST: &str = "single-quanser-ip02";
 
 /// A rig from which a person can start.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,9 +59,9 @@ pub struct Example {
 pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
-    let shared: String = SHARED.map(|name| file(name).replace("export ", "")).concat();
-    let script = bare(&format!("'use strict';\n{{\n{shared}{}}}\n", SCRIPTS.concat()));
     let twin = TwinPage::new();
+    let shared = shared();
+    let script = bare(&format!("'use strict';\n{{\n{shared}'{SHARED_END}';\n{}}}\n", SCRIPTS.concat()));
     // A document inside the page has its policy.
     let policy = format!(
         "default-src 'none'; script-src '{}' '{}' 'wasm-unsafe-eval' blob:; style-src '{}' '{}'; img-src data:; \
@@ -69,9 +77,11 @@ pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
         ("{style}", style),
         ("{baud}", BAUD.to_string()),
         ("{examples}", embedded(&shown)),
+        ("{first}", embedded(&first(examples))),
         ("{lessons}", embedded(&lessons)),
         ("{worker}", embedded(&bare(WORKER))),
-        ("{twin}", embedded(&twin.html)),
+        // The page puts back what its own script has, too.
+        ("{twin}", embedded(&twin.html.replacen(&shared, SHARED_MARK, 1))),
         ("{theme}", embedded(&page_theme())),
         ("{motions}", base64(&packed(&knots))),
         ("{module}", base64(&packed(module))),
@@ -86,6 +96,16 @@ pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
         rest = after;
     }
     page + rest
+}
+
+/// The rig that is shown before the module can be asked: its name, and what is drawn of it.
+fn first(examples: &[Example]) -> Value {
+    let Some(first) = examples.iter().find(|example| example.name == FIRST).or(examples.first()) else {
+        return Value::Null;
+    };
+    let question = json!({ "ask": "check", "toml": first.toml }).to_string();
+    let sketch: Value = serde_json::from_str(&Desk::default().answer(&question)).unwrap_or_default();
+    json!({ "name": first.name, "sketch": sketch })
 }
 
 /// The examples as the page reads them, and the knots of all their motions.
@@ -117,7 +137,7 @@ mod tests {
         let toml = "name = \"</script>\"".to_owned();
         let page = page(b"module", &[Example { name: "mine".to_owned(), toml, motions: None }], &[]);
         assert!(page.contains("default-src 'none'") && page.contains("<\\/script>"));
-        assert_eq!(page.matches("</script>").count(), 8);
+        assert_eq!(page.matches("</script>").count(), 9);
         assert!(page.trim_end().ends_with("</html>"), "a mark is missing in the page");
         for request in ["src=\"", "@import", "fetch(", "XMLHttpRequest", "https://", "url("] {
             assert!(!page.contains(request), "{request}");

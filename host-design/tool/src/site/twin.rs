@@ -3,20 +3,21 @@
 use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::twin::assets::{ASSETS, Asset};
 
-/// The modules of its script, each after those that it imports.
+/// The modules of its script, each after those that it imports: first those that the desk has, too.
 const MODULES: [&str; 11] = [
     "colours.js",
     "scale.js",
     "words.js",
-    "link.js",
     "guide.js",
-    "history.js",
     "rig.js",
+    "link.js",
+    "history.js",
     "scope.js",
     "controls.js",
     "drawers.js",
     "main.js",
 ];
+const SHARED: usize = 5;
 
 /// The twin's page in one document.
 pub(super) struct TwinPage {
@@ -32,8 +33,8 @@ impl TwinPage {
     /// Puts the files together.
     pub(super) fn new() -> Self {
         let style = [style_sheet().as_str(), COLOURS_CSS, file("page.css")].concat();
-        let modules: String = MODULES.iter().map(|name| module(name, file(name))).collect();
-        let script = bare(&format!("'use strict';\nconst modules = {{}};\n{modules}"));
+        let own: String = MODULES.iter().skip(SHARED).map(|name| module(name, file(name))).collect();
+        let script = format!("'use strict';\n{}{}", shared(), bare(&own));
         let is_apart =
             |line: &&str| line.starts_with("<link rel=\"stylesheet\"") || line.starts_with("<script");
         let (mut html, mut is_styled) = (String::new(), false);
@@ -53,6 +54,12 @@ impl TwinPage {
     }
 }
 
+/// The modules that the desk has, too.
+pub(super) fn shared() -> String {
+    let modules: String = MODULES.iter().take(SHARED).map(|name| module(name, file(name))).collect();
+    bare(&format!("const modules = {{}};\n{modules}"))
+}
+
 /// A script without its comments and indentation, which a page need not carry.
 pub(super) fn bare(script: &str) -> String {
     let lines = script.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
@@ -60,7 +67,7 @@ pub(super) fn bare(script: &str) -> String {
 }
 
 /// The content of a file of the twin's page.
-pub(super) fn file(name: &str) -> &'static str {
+fn file(name: &str) -> &'static str {
     ASSETS.iter().find(|asset: &&Asset| asset.name == name).map_or("", |asset| asset.content)
 }
 

@@ -33,7 +33,7 @@ fn reload(browser: &mut Browser, address: &str) {
 
 /// Waits until what is shown is the design of this text, which is in the editor.
 fn designed(browser: &mut Browser, toml: &str) {
-    until(browser, &format!("{TEXT} === {} && {VERDICT}.textContent.startsWith('It ')", json!(toml)));
+    until(browser, &format!("{TEXT} === {} && {VERDICT}.textContent.startsWith('survives')", json!(toml)));
 }
 
 #[test]
@@ -56,9 +56,16 @@ fn edited_work_outlives_the_link_it_came_from_and_a_damaged_link_stops_nothing()
     assert_eq!(browser.value(TEXT), edited);
 
     let (plain, code) = link.split_once("#rig=").unwrap();
-    // A link of an older page has no sum; what is in it may be no rig.
-    reload(&mut browser, &format!("{plain}#rig={}", code.split_once('.').unwrap().1));
+    // A link of an older page has no sum. What a person has changed is not replaced before they say so.
+    let old = format!("{plain}#rig={}", code.split_once('.').unwrap().1);
+    reload(&mut browser, &old);
+    assert_eq!(browser.value(TEXT), edited);
+    click(&mut browser, "#notice button:nth-of-type(2)");
+    assert_eq!((browser.value(TEXT), address(&mut browser)), (json!(edited), plain.to_owned()));
+    reload(&mut browser, &old);
+    click(&mut browser, "#notice button");
     designed(&mut browser, &own());
+    // What is in a link may be no rig.
     browser.open_address("about:blank", 1280, "light", "screen");
     browser.open_address(&format!("{plain}#rig=AAAA"), 1280, "light", "screen");
     until(&mut browser, "!document.getElementById('problem').hidden");
@@ -147,9 +154,8 @@ fn after_a_wrong_input_nothing_is_called_good_and_the_reason_is_in_sight() {
         ("1e9", ""),
     ] {
         field(&mut browser, "link[1].mass_kg", value);
-        let is_told = format!(
-            "{VERDICT}.className !== 'good' && !{VERDICT}.textContent.startsWith('It stays upright.')"
-        );
+        let is_told =
+            format!("{VERDICT}.className !== 'good' && !/^survives( ·|$)/.test({VERDICT}.textContent)");
         until(&mut browser, &is_told);
         if !reason.is_empty() {
             let told = browser.value(&format!(
@@ -163,6 +169,7 @@ fn after_a_wrong_input_nothing_is_called_good_and_the_reason_is_in_sight() {
                 );
             }
             assert_eq!(browser.value("document.getElementById('save-table').disabled"), true);
+            assert_eq!(browser.value("document.getElementById('stage').classList.contains('old')"), true);
         }
         assert_eq!(browser.value(&in_sight), true, "{value}");
         field(&mut browser, "link[1].mass_kg", "0.23");
@@ -184,25 +191,110 @@ fn after_a_wrong_input_nothing_is_called_good_and_the_reason_is_in_sight() {
 }
 
 #[test]
-fn the_drawing_the_verdict_and_balance_it_are_in_the_first_screen_before_any_figure() {
+fn what_moves_its_verdict_and_the_sliders_are_in_the_first_screen_before_any_figure() {
     for (width, height) in [(TELEPHONE, 844), (1280, 800)] {
         let Some((mut browser, _folder)) = opened_in(width) else { return };
-        until(&mut browser, &format!("{VERDICT}.textContent === 'It stays upright.'"));
-        for part in ["drawing", "verdict", "balance"] {
+        until(
+            &mut browser,
+            &format!("/^survives · tilt up to .*° · touch of .* N$/.test({VERDICT}.textContent)"),
+        );
+        for part in ["rig", "verdict", "dial-length", "dial-weight", "dial-late", "balance"] {
             let bottom =
                 browser.value(&format!("document.getElementById('{part}').getBoundingClientRect().bottom"));
             assert!(bottom.as_f64().unwrap() <= f64::from(height), "{width}: {part} ends at {bottom}");
         }
         let before = browser.value(
             "[...document.querySelectorAll('main input, main button, main select, main textarea')].every((control) => \
-             document.getElementById('drawing').compareDocumentPosition(control) & Node.DOCUMENT_POSITION_FOLLOWING)",
+             document.getElementById('rig').compareDocumentPosition(control) & Node.DOCUMENT_POSITION_FOLLOWING)",
         );
-        assert_eq!(before, true, "a form comes before the drawing");
+        assert_eq!(before, true, "a form comes before what moves");
         assert_eq!(browser.value("document.getElementById('example').value"), "single-quanser-ip02");
-        assert_eq!(browser.unnamed_controls(), Vec::<String>::new());
+        for tab in 1..=9 {
+            click(&mut browser, &format!("#tabs button:nth-child({tab})"));
+            let panels = browser.value("document.querySelectorAll('[data-panel]:not([hidden])').length");
+            assert_eq!(panels, 1);
+            assert_eq!(browser.unnamed_controls(), Vec::<String>::new(), "{tab}");
+        }
+        click(&mut browser, "#tabs button");
         // Negative control.
-        browser.value("document.querySelector('label[for=lean]').remove()");
-        assert!(comes_within(&mut browser, 1.0, "!document.querySelector('label[for=lean]')"));
+        browser.value("document.querySelector('label[for=dial-length]').remove()");
+        assert!(comes_within(&mut browser, 1.0, "!document.querySelector('label[for=dial-length]')"));
         assert_eq!(browser.unnamed_controls(), ["\"slider\""]);
+        assert_eq!(browser.errors(), Vec::<String>::new());
     }
+}
+
+/// Moves a slider of the first view.
+fn dial(browser: &mut Browser, name: &str, value: f64) {
+    browser.value(&format!(
+        "{{ const dial = document.getElementById('dial-{name}'); dial.value = {value}; \
+         dial.dispatchEvent(new Event('input')); }}"
+    ));
+}
+
+#[test]
+fn a_slider_designs_the_rig_again_lets_the_new_one_stand_and_says_what_changed() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    let sentence = format!("{VERDICT}.textContent.includes('touch')");
+    until(&mut browser, &sentence);
+    let before = browser.value("upright.desk.survival");
+    dial(&mut browser, "length", 1.0);
+    let stands = "Math.abs(upright.live().hello.lengths_m[0] - 1.28) < 0.01 && upright.live().latest?.state === 'Balancing'";
+    assert!(comes_within(&mut browser, 20.0, stands));
+    until(&mut browser, &sentence);
+    // Twice as long: centre of mass and inertia go with it.
+    let text = browser.value(TEXT);
+    for line in ["length_m = 1.28", "centre_of_mass_m = 0.659061", "inertia_kg_m2 = 0.0313923"] {
+        assert!(text.as_str().unwrap().contains(line), "{line}: {text}");
+    }
+    let changed = |browser: &mut Browser| {
+        let rows = "[...document.querySelectorAll('#changes tr')].map((row) => row.cells[0].textContent)";
+        browser.value(rows)
+    };
+    until(&mut browser, "upright.desk.survival && document.querySelectorAll('#changes tr').length > 2");
+    assert_ne!(browser.value("upright.desk.survival"), before);
+    assert_eq!(changed(&mut browser)[0], "tilt");
+    click(&mut browser, "#undo");
+    designed(&mut browser, &read("single-quanser-ip02"));
+    until(&mut browser, "upright.desk.survival");
+    assert_eq!(browser.value("upright.desk.survival"), before);
+
+    // What differs from the example, one value taken back; and two loops side by side.
+    click(&mut browser, "#keep");
+    dial(&mut browser, "weight", 1.0);
+    until(&mut browser, "document.querySelectorAll('#differences tr').length === 2");
+    let differs = "document.getElementById('changed').textContent";
+    assert_eq!(browser.value(differs), "2 values differ from single-quanser-ip02");
+    click(&mut browser, "#changed");
+    click(&mut browser, "#differences tr:nth-child(2) button");
+    until(&mut browser, "document.querySelectorAll('#differences tr').length === 1");
+    assert!(browser.value(TEXT).as_str().unwrap().contains("inertia_kg_m2 = 7.88e-3"));
+    click(&mut browser, "[data-tab=run]");
+    let columns = "[...document.querySelectorAll('#side-by-side tr')].map((row) => [row.cells[1].textContent, row.cells[2].textContent])";
+    until(&mut browser, "upright.desk.survival && document.querySelectorAll('#side-by-side tr').length > 3");
+    let columns: Vec<[String; 2]> = serde_json::from_value(browser.value(columns)).unwrap();
+    assert!(
+        columns[0][0].starts_with("kept") && columns.iter().skip(1).any(|[kept, now]| kept != now),
+        "{columns:?}"
+    );
+    click(&mut browser, "#replay");
+    assert!(comes_within(&mut browser, 10.0, "document.querySelectorAll('#together polyline').length === 2"));
+    click(&mut browser, "#forget");
+    assert_eq!(browser.value("document.getElementById('compared').hidden"), true);
+
+    // A link more, another drive and other sensors, by their pictures; and what cannot be, beside them.
+    let [links, drive, sensors] = [1, 2, 3];
+    let choose = |browser: &mut Browser, group: usize, number: usize| {
+        click(browser, &format!("#pictures .choice:nth-of-type({group}) button:nth-child({number})"));
+        until(browser, &format!("{VERDICT}.textContent.startsWith('survives')"));
+    };
+    choose(&mut browser, links, 2);
+    until(&mut browser, "upright.desk.sketch.lengths_m.length === 2");
+    choose(&mut browser, sensors, 2);
+    until(&mut browser, "upright.desk.sketch.sensors === 'absolute'");
+    choose(&mut browser, links, 1);
+    choose(&mut browser, drive, 3);
+    until(&mut browser, "upright.desk.sketch.drive === 'stepper'");
+    assert!(comes_within(&mut browser, 20.0, "upright.live().hello.input[0] === 'Acceleration'"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
 }

@@ -63,6 +63,7 @@ fn here_s() -> f64 {
 #[test]
 fn gains_and_closed_loop_follow_a_weight_in_a_second_of_processor_time_and_the_page_stays_free() {
     let Some((mut browser, _folder)) = opened() else { return };
+    let moved_s = browser.value("upright.live().began_ms / 1e3").as_f64().unwrap();
     begin_with(&mut browser, "quadruple-paper");
     let first_s = browser.value("performance.getEntriesByName('first-contentful-paint')[0].startTime / 1e3");
     let moved: Vec<[f64; 4]> = serde_json::from_value(browser.value(MOVED)).unwrap();
@@ -70,6 +71,7 @@ fn gains_and_closed_loop_follow_a_weight_in_a_second_of_processor_time_and_the_p
     let least = |place: usize| moved.iter().map(|times| times[place]).fold(f64::INFINITY, f64::min);
     let [designed, poles, run, pause] = [0, 1, 2, 3].map(least);
     eprintln!("page: first picture {first_s:.2} s after it is opened from the disk");
+    eprintln!("page: a rig moves {moved_s:.2} s after it is opened");
     eprintln!(
         "page: a weight of four links moved: gains, certificates and closed loop after {:.2} s, of which the run {:.2} s; \
          poles {:.2} s later; longest pause of the page {:.2} s; the library itself {here_s:.2} s",

@@ -13,6 +13,7 @@ use upright_tool::site::{examples, lessons, module, page};
 
 use crate::report_devtools::Browser;
 use crate::site_bits::is_wanted;
+use crate::twin_page::comes_within;
 
 /// Most bytes that a server sends for the page, compressed.
 const COMPRESSED: usize = 1_000_000;
@@ -177,13 +178,14 @@ fn a_rig_is_typed_corrected_changed_and_sent_as_a_link() {
     let first_gain = "upright.desk.design.laws[0].continuous.k[0]";
     until(&mut browser, &format!("document.getElementById('problem').hidden && {first_gain} < 2"));
 
-    // A page that is loaded again has the rig as it was; with reduced motion, its run does not play by itself.
-    until(&mut browser, "upright.desk.at > 0");
+    // A page that is loaded again has the rig as it was; with reduced motion, nothing nudges it.
+    until(&mut browser, "upright.live().nudges > 0");
     browser.reduces_motion = true;
     let address = browser.value("location.href");
     browser.open_address(address.as_str().unwrap(), 1280, "light", "screen");
     until(&mut browser, &format!("upright.desk.design && upright.desk.poles && {first_gain} < 2"));
-    assert_eq!(browser.value("upright.desk.at"), 0);
+    assert!(comes_within(&mut browser, 20.0, "upright.live().latest?.state === 'Balancing'"));
+    assert!(!comes_within(&mut browser, 6.0, "upright.live().nudges > 0"));
 
     // A weight that is moved changes text and gains.
     browser.value(

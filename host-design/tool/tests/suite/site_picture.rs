@@ -7,7 +7,7 @@ use crate::site_page::{opened_in, root, until};
 
 const PICTURE: &str = "docs/site.png";
 const GUIDE: &str = "docs/site.md";
-const SIZE: [u32; 2] = [1280, 1500];
+const SIZE: [u32; 2] = [1280, 800];
 /// What decides how the page looks.
 const LOOK: [&str; 2] =
     [include_str!("../../src/site/page/desk.html"), include_str!("../../src/site/page/desk.css")];
@@ -42,7 +42,7 @@ fn bytes_of_letters(letters: &str) -> Vec<u8> {
 /// Makes the picture again, where a browser and the page's module are.
 fn bless() {
     let Some((mut browser, _folder)) = opened_in(SIZE[0]) else { return };
-    until(&mut browser, "upright.desk.at > 1");
+    until(&mut browser, "upright.desk.survival && upright.live().latest");
     std::fs::write(root().join(PICTURE), bytes_of_letters(&browser.picture(SIZE))).unwrap();
     let guide = std::fs::read_to_string(root().join(GUIDE)).unwrap();
     let begin = guide.find("<!-- site.png: ").expect("the guide says which page its picture shows");

@@ -21,6 +21,12 @@ fn tab_to(browser: &mut Browser, is_it: &str) {
     panic!("the focus never comes to {is_it}");
 }
 
+/// Opens a panel of the desk.
+fn turn_to(browser: &mut Browser, tab: &str) {
+    tab_to(browser, &format!("dataset.tab === '{tab}'"));
+    browser.strike("Enter");
+}
+
 /// A rig file without its comments, as a person types it.
 fn without_comments(file: &str) -> String {
     let text = std::fs::read_to_string(root().join("rigs").join(file)).unwrap();
@@ -38,6 +44,7 @@ fn saved(file: &Path) -> String {
 /// Types the paper's rig into the empty editor, and saves its table into a folder.
 fn typed_and_exported(browser: &mut Browser, folder: &Path) {
     let toml = without_comments("quadruple-paper.toml");
+    turn_to(browser, "file");
     tab_to(browser, "id === 'toml'");
     for command in ["selectAll", "deleteBackward"] {
         browser.edit(command);
@@ -60,6 +67,7 @@ fn typed_and_exported(browser: &mut Browser, folder: &Path) {
     let typed = folder.join("typed.toml");
     std::fs::write(&typed, &toml).unwrap();
     browser.save_into(folder);
+    turn_to(browser, "export");
     tab_to(browser, "id === 'save-table'");
     browser.strike("Enter");
     let table = saved(&folder.join("gains.rs"));
@@ -73,6 +81,7 @@ fn typed_and_exported(browser: &mut Browser, folder: &Path) {
 fn the_papers_rig_is_typed_designed_exported_balanced_pulled_broken_and_put_back_with_keys_alone() {
     let Some((mut browser, folder)) = opened_in(TELEPHONE) else { return };
     typed_and_exported(&mut browser, folder.path());
+    turn_to(&mut browser, "try");
     tab_to(&mut browser, "id === 'balance'");
     browser.strike("Enter");
     until(&mut browser, "document.querySelector('#twin iframe')?.contentWindow?.upright?.seen?.picture");

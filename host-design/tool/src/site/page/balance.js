@@ -3,10 +3,18 @@
 const RUN = 'upright run'; // names in the tab's store
 const SCOPES = 'upright scopes';
 
+// The twin's page, with what this page's script has, too.
+function twinPage() {
+  const own = document.scripts[document.scripts.length - 1].textContent;
+  const shared = own.slice(own.indexOf('const modules'), own.indexOf("'end of what is shared'"));
+  return JSON.parse(embedded('twin-page')).replace('{shared}', () => shared);
+}
+
 class Twin {
-  constructor(module, failed) {
+  // `failed(why)` says why a rig cannot run, `away(is)` that a person is here.
+  constructor(module, failed, away) {
     // `falls` are the faults that a person has seen in this page, each with what was not as designed.
-    Object.assign(this, { module, failed, frame: null, thread: null, line: null, kept: null, falls: [] });
+    Object.assign(this, { module, failed, away, frame: null, thread: null, line: null, kept: null, falls: [] });
     addEventListener('pagehide', () => this.keep());
     byId('close').addEventListener('click', () => this.close());
     // Stop works wherever the focus is.
@@ -23,7 +31,7 @@ class Twin {
     this.kept = kept === null ? null : { rig, kept };
     if (kept === null) store()?.removeItem(SCOPES);
     const { port1: here, port2: there } = new MessageChannel();
-    this.frame = element('iframe', { srcdoc: JSON.parse(embedded('twin-page')), title: 'The rig under power' });
+    this.frame = element('iframe', { srcdoc: twinPage(), title: 'The rig under power' });
     this.frame.addEventListener('load', () => {
       this.frame.contentWindow.postMessage(null, '*', [here]);
       this.frame.contentWindow.focus();
@@ -33,7 +41,7 @@ class Twin {
     this.thread = new Thread(this.module);
     this.thread.keep = (changes) => { this.kept = { rig, kept: changes }; };
     this.thread.fell = (fall) => { this.falls.push({ toml: rig.toml, ...fall }); };
-    this.thread.run({ rig, kept }, JSON.parse(embedded('theme')), there, line?.there ?? null, ({ failed }) => {
+    this.thread.run({ rig, kept, keeps: true }, JSON.parse(embedded('theme')), there, line?.there ?? null, ({ failed }) => {
       if (failed === undefined) return;
       this.close();
       this.failed(failed.why);
@@ -58,7 +66,8 @@ class Twin {
 
   show(isShown) {
     byId('twin').hidden = !isShown;
-    for (const place of document.querySelectorAll('main, header, #told')) place.hidden = isShown;
+    for (const place of document.querySelectorAll('main, header, #tabs')) place.hidden = isShown;
+    this.away(isShown);
     // An exercise is answered while one looks; its text is folded then.
     byId(isShown ? 'twin' : 'lesson-place').append(byId('lesson'));
     byId('lesson').querySelector('details').open = !isShown;

@@ -3,55 +3,61 @@
 const examples = JSON.parse(embedded('examples'));
 const DEGREES = 180 / Math.PI;
 const LEAST_MS = 16;
-const FIRST = 'single-quanser-ip02'; // where a person begins who has no rig
 const KEPT = 'upright rig'; // name in the tab's store
 const LARGEST_FILE = 1e6; // bytes
 const NEEDS_TABLE = ['save-table', 'save-header', 'save-csv', 'balance', 'connect', 'verify'];
-const SHOWN = ['drawing', 'plots', 'figures', 'gains', 'poles'];
+const SHOWN = ['stage', 'plots', 'figures', 'gains', 'poles', 'changes'];
 
-// `linked` is the rig file that the address holds.
-const desk = { sketch: null, design: null, poles: null, began: 0, at: 0, linked: null };
-let checker = null;
-let designer = null;
-let twin = null;
-let trust = null;
+// `linked` is the rig file that the address holds; what is shown `isOld` after a wrong input.
+const desk = { sketch: null, design: null, poles: null, survival: null, linked: null, isOld: false };
+let [checker, designer, surveyor, twin, trust, live, imperfections] = new Array(7).fill(null);
 
 const editor = new Editor(() => changed());
-const set = (key, value, refuse) => {
-  checker?.ask('set', { ask: 'set', toml: editor.value, key, value }, (answer) => {
+const comparison = new Comparison();
+// Gives keys of the rig file other values, or none, and its chain a number of links; `kind` names the change for undo.
+const set = (values, kind, refuse, links = null) => {
+  checker?.ask('set', { ask: 'set', toml: editor.value, values, links }, (answer) => {
     if (answer.failed === undefined) {
-      editor.set(answer.toml, key);
+      editor.set(answer.toml, kind);
       return changed();
     }
-    return refuse === undefined ? wrong(answer.failed) : refuse(answer.failed.why);
+    outdate(answer.failed.why);
+    return refuse?.(answer.failed.why);
   });
 };
 const form = new Form(set, (why) => outdate(why));
 const weights = new Weights(set);
+const dials = new Dials(set);
+const machine = new MachinePictures(set);
+const panels = new Panels((name) => { if (['law', 'run'].includes(name)) drawFigures(); });
+const differences = new Differences((key, value) => set([[key, value]], key), () => panels.open('file'));
+const snapshots = new Snapshots(() => showLoop());
 
 function tell(text, isBad = false) {
   byId('told').textContent = text;
   byId('told').classList.toggle('bad', isBad);
 }
 
-// Says something that stays until the rig is changed; with `undoes`, beside a button that takes the last change back.
-function notice(text, { isBad = false, undoes = false } = {}) {
+// Says something that stays until the rig is changed, beside buttons: for each its text, and what it does.
+function notice(text, choices = {}, isBad = false) {
   byId('notice').hidden = text === '';
   byId('notice').classList.toggle('bad', isBad);
-  const undo = element('button', { type: 'button', textContent: 'undo' });
-  undo.addEventListener('click', (event) => editor.step(event, true));
-  byId('notice').replaceChildren(text, ...(undoes ? [undo] : []));
+  byId('notice').replaceChildren(text, ...Object.entries(choices).map(([said, act]) => {
+    const button = element('button', { type: 'button', textContent: said });
+    button.addEventListener('click', act);
+    return button;
+  }));
 }
 
 // What is shown is not of the rig that is wanted; `why` says what is wrong with that one.
 function outdate(why) {
+  desk.isOld = true;
   for (const id of SHOWN) byId(id).classList.add('old');
   for (const id of NEEDS_TABLE) byId(id).disabled = true;
   byId('verdict').className = 'bad';
   byId('verdict').replaceChildren(...inPieces(why));
-  byId('figures').textContent = 'What is drawn is the rig before.';
-  byId('figures').classList.remove('old');
-  byId('unusual').replaceChildren();
+  byId('figures').textContent = '';
+  byId('unusual').replaceChildren(element('li', { textContent: 'What moves and is drawn is the rig before.' }));
   tell('');
 }
 
@@ -70,6 +76,7 @@ function changed() {
     history.replaceState(null, '', withoutRig());
   }
   trust.forget();
+  comparison.changes();
   checker.ask('check', { ask: 'check', toml: editor.value }, checked);
 }
 
@@ -77,24 +84,35 @@ function checked(answer) {
   if (answer.failed !== undefined) return wrong(answer.failed);
   editor.mark(undefined);
   for (const id of NEEDS_TABLE) byId(id).disabled = true;
+  sketched(answer);
+  return redesign();
+}
+
+// What can be shown of a rig before it is designed.
+function sketched(answer) {
   desk.sketch = answer;
   form.show(answer.fields);
   weights.show(answer.weights);
-  draw();
-  return redesign();
+  dials.show(answer.dials, answer.rig, answer.lengths_m.length);
+  machine.show(answer);
+  live.rest(answer);
+  const { name, text } = editor.origin;
+  checker.ask('differences', { ask: 'differences', toml: editor.value, from: text }, (found) => {
+    differences.show(name, found.differences ?? []);
+  });
 }
 
 // How the closed loop is disturbed in the run that is shown.
 const disturbed = () => ({ lean_rad: Number(byId('lean').value) / DEGREES, step_m: Number(byId('step').value) });
 
 function redesign() {
-  for (const id of ['plots', 'gains', 'poles', 'figures']) byId(id).classList.add('old');
-  byId('verdict').className = '';
+  for (const id of ['plots', 'gains', 'poles', 'figures', 'changes']) byId(id).classList.add('old');
+  byId('verdict').className = 'waits';
   const toml = editor.value;
   tell('designing …');
   designer.ask('design', { ask: 'design', toml, ...disturbed() }, (answer, ms) => {
     if (answer.failed !== undefined) return toml === editor.value ? wrong(answer.failed) : undefined;
-    designed(answer, ms);
+    designed(answer, ms, toml);
     return designer.ask('poles', { ask: 'poles', toml }, (poles) => {
       if (poles.failed !== undefined) return;
       desk.poles = poles;
@@ -103,25 +121,52 @@ function redesign() {
   });
 }
 
-function designed(answer, ms) {
-  desk.design = answer;
+function designed(answer, ms, toml) {
+  Object.assign(desk, { design: answer, isOld: false });
   const law = byId('law');
   const names = answer.laws.map(({ law: name }) => name);
   if ([...law.options].map(({ value }) => value).join() !== names.join()) {
     law.replaceChildren(...answer.laws.map(({ law: value, title }) => element('option', { value, textContent: title })));
   }
   if (answer.crc === null) tell(`no table: ${plain(answer.no_table)}`, true);
-  else tell(`designed and run in ${(ms / 1e3).toFixed(2)} s`);
+  else tell(`designed in ${(ms / 1e3).toFixed(2)} s`);
   for (const id of NEEDS_TABLE) byId(id).disabled = answer.crc === null;
+  byId('stage').classList.remove('old');
+  if (toml !== live.wanted?.toml && answer.crc !== null) live.show({ toml, motions: null });
   showLoop();
   showDesign();
+  survey(toml);
 }
 
-// What the run shows, in plain words.
+// How much it stands takes longer than the design.
+function survey(toml) {
+  desk.survival = null;
+  if (chosen()?.run?.fell !== false || desk.sketch.lengths_m.length === 0) return showAbilities();
+  surveyor ??= new Thread(live.module);
+  return surveyor.ask('survival', { ask: 'survival', toml, law: byId('law').value }, (answer) => {
+    if (toml !== editor.value || answer.failed !== undefined) return;
+    desk.survival = answer;
+    showAbilities();
+  });
+}
+
+function showAbilities() {
+  if (desk.isOld) return;
+  const run = chosen()?.run;
+  if (run !== null && run !== undefined) byId('verdict').textContent = inWords(run);
+  comparison.take({ survival: desk.survival ?? {}, law: chosen() });
+  if (desk.design !== null) snapshots.show(snapshot());
+  byId('changes').classList.toggle('old', desk.survival === null && run?.fell === false);
+}
+
+// What the run shows, and how much the loop stands, in plain words.
 function inWords({ fell }) {
-  const what = desk.sketch.lengths_m.length > 0 ? 'It stays upright' : 'It survives';
-  if (fell) return 'It falls.';
-  return desk.sketch.unusual.length === 0 ? `${what}.` : `${what}, if its numbers are right:`;
+  if (fell) return 'falls';
+  if (desk.sketch.unusual.length > 0) return 'survives, if its numbers are right:';
+  const { tilt_rad: tilt, touch_n: touch } = desk.survival ?? {};
+  const parts = ['survives', ...(tilt === undefined ? [] : [`tilt up to ${Number((tilt * DEGREES).toPrecision(2))}°`]),
+    ...(touch === undefined || touch === null ? [] : [`touch of ${Number(touch.toPrecision(2))} N`])];
+  return parts.join(' · ');
 }
 
 const chosen = () => desk.design?.laws.find(({ law }) => law === byId('law').value) ?? desk.design?.laws[0];
@@ -136,14 +181,13 @@ function showLoop() {
   verdict.className = run === null || (unusual.length > 0 && !run.fell) ? '' : run.fell ? 'bad' : 'good';
   byId('unusual').replaceChildren(...unusual.map((text) => element('li', {}, ...inPieces(text))));
   byId('figures').textContent = run === null ? '' : said.split('\n').map((line) => line.trim()).join('; ');
-  for (const id of ['drawing', 'plots', 'figures']) byId(id).classList.remove('old');
-  byId('play').disabled = run === null;
+  for (const id of ['plots', 'figures']) byId(id).classList.remove('old');
   if (run === null) return byId('plots').replaceChildren();
   const links = desk.sketch.lengths_m.length;
   const state = (index, factor = 1) => (row) => factor * row[3][index];
   const plots = [
     ['position (m)', [{ name: 'cart', value: state(0), colour: curveColour(0) }, { name: 'set-point', value: (row) => row[1], colour: 'var(--limit)' }]],
-    ['angles (°)', desk.sketch.lengths_m.map((_, link) => ({ name: `link ${link + 1}`, value: state(2 + 2 * link, DEGREES), colour: curveColour(link) }))],
+    ['angles (°)', desk.sketch.lengths_m.map((_, link) => ({ name: `link ${link + 1}`, value: state(2 + 2 * link, DEGREES), state: 2 + 2 * link, colour: curveColour(link) }))],
     [desk.sketch.input, [{ name: 'applied', value: (row) => row[2], colour: curveColour(1) }]],
   ].filter(([, curves]) => links > 0 || curves[0]?.name === 'applied');
   byId('plots').replaceChildren(...plots.map(([title, curves]) => {
@@ -156,11 +200,24 @@ function showLoop() {
     const place = svg('svg', { class: 'plot', role: 'img', 'aria-label': title });
     return element('figure', {}, caption, place);
   }));
-  plots.forEach(([, curves], index) => drawCurves(byId('plots').querySelectorAll('svg')[index], curves, run.rows));
-  desk.at = 0;
-  draw();
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) play();
+  const kept = snapshots.curves(plots.map(([, curves]) => curves));
+  plots.forEach(([, curves], index) => drawCurves(byId('plots').querySelectorAll('svg')[index], curves, run.rows, kept?.[index]));
+  snapshots.show(snapshot());
   return undefined;
+}
+
+// What is kept of the loop as it is now, to be compared with another one.
+function snapshot() {
+  const law = chosen();
+  return { name: `${desk.sketch.rig}, ${law.title}`, lengths: desk.sketch.lengths_m, travel: desk.sketch.travel_m, rows: law.run?.rows ?? null,
+    abilities: abilities({ survival: desk.survival ?? {}, law }) };
+}
+
+// Figures have the size of their place, so they are drawn when it is in view.
+function drawFigures() {
+  if (desk.design === null) return;
+  showLoop();
+  showDesign();
 }
 
 const numbers = (values) => values.map((value) => short(value)).join('  ').replaceAll('-', '−');
@@ -185,34 +242,6 @@ function showDesign() {
   if (poles === null) return undefined;
   byId('poles').classList.remove('old');
   return drawPoles(byId('poles'), poles);
-}
-
-// Draws the rig at the time shown.
-function draw() {
-  if (desk.sketch === null) return;
-  const rows = chosen()?.run?.rows;
-  const states = 2 * desk.sketch.lengths_m.length + 2;
-  const row = rows?.[Math.min(rows.length - 1, Math.round((desk.at / rows.at(-1)[0]) * (rows.length - 1)))];
-  const fits = row !== undefined && row[3].length === states;
-  byId('time').textContent = fits ? `${row[0].toFixed(1)} s` : '';
-  drawRig(byId('drawing'), desk.sketch, fits ? row[3] : new Array(states).fill(0), fits ? row[1] : null);
-}
-
-function play() {
-  desk.began = performance.now() - 1e3 * desk.at;
-  const own = desk.began;
-  let last = 0;
-  const step = (now) => {
-    const end = chosen()?.run?.rows.at(-1)[0] ?? 0;
-    if (own !== desk.began || desk.at >= end) return;
-    if (now - last >= LEAST_MS) {
-      last = now;
-      desk.at = Math.min(end, (now - own) / 1e3);
-      draw();
-    }
-    requestAnimationFrame(step);
-  };
-  requestAnimationFrame(step);
 }
 
 function save(name, text, type = 'text/plain') {
@@ -241,29 +270,41 @@ function motions() {
 
 // Puts another rig file on the desk. The one before can be brought back, which is said if a person has worked on it.
 function replace(toml, what) {
-  if (toml === editor.value) return changed();
-  const isOwn = editor.value.trim() !== '' && !examples.some((example) => example.toml === editor.value);
-  editor.set(toml, what);
+  const { isOwn, value } = editor;
+  editor.set(toml, what, { name: what, text: toml });
   changed();
-  return isOwn ? notice(`${what} has taken the place of your rig.`, { undoes: true }) : undefined;
+  return isOwn && value !== toml ? notice(`${what} has taken the place of your rig.`, { undo: (event) => editor.step(event, true) }) : undefined;
 }
 
 async function openFile(file) {
-  if (file.size > LARGEST_FILE) return notice(`${file.name} is too large for a rig file.`, { isBad: true });
+  if (file.size > LARGEST_FILE) return notice(`${file.name} is too large for a rig file.`, {}, true);
   return replace(await file.text(), file.name);
 }
 
-// The rig in the address, if there is one.
+// The rig in the address, if there is one. It takes no work away without a word.
 function openLink() {
   const link = rigOfLink();
   if (link === null) return false;
   if (link.why !== undefined) {
-    notice(link.why, { isBad: true });
+    notice(link.why, {}, true);
     return false;
   }
-  desk.linked = link.toml;
-  replace(link.toml, 'The rig of the link');
-  return true;
+  const open = () => {
+    desk.linked = link.toml;
+    replace(link.toml, 'the rig of the link');
+  };
+  if (!editor.isOwn || editor.value === link.toml) {
+    open();
+    return true;
+  }
+  notice('The link holds another rig than the one that you have changed here.', {
+    'open the rig of the link': open,
+    'keep mine': () => {
+      history.replaceState(null, '', withoutRig());
+      notice('');
+    },
+  });
+  return false;
 }
 
 function listenToFiles() {
@@ -288,6 +329,7 @@ function listenToFiles() {
 }
 
 function listen() {
+  byId('keep').addEventListener('click', () => { snapshots.keep(snapshot()); });
   byId('example').replaceChildren(...examples.map(({ name }) => element('option', { value: name, textContent: name })));
   byId('example').addEventListener('change', ({ target }) => {
     replace(examples.find(({ name }) => name === target.value).toml, target.value);
@@ -302,8 +344,7 @@ function listen() {
     show();
     byId(id).addEventListener('input', () => { show(); redesign(); });
   }
-  byId('law').addEventListener('change', () => { showLoop(); showDesign(); trust.show(); });
-  byId('play').addEventListener('click', () => { desk.at = 0; play(); });
+  byId('law').addEventListener('change', () => { drawFigures(); trust.show(); survey(editor.value); });
   byId('balance').addEventListener('click', () => {
     twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked, since_1970_s: Date.now() / 1e3 });
   });
@@ -330,28 +371,38 @@ function listen() {
   let resized = null;
   addEventListener('resize', () => {
     clearTimeout(resized);
-    resized = setTimeout(() => { if (desk.design !== null) { showLoop(); showDesign(); } }, 150);
+    resized = setTimeout(drawFigures, 150);
   });
 }
 
 // What the page shows first: the rig of its address, what the tab held when it was loaded before, or the first example.
 function first() {
-  const { name, toml } = examples.find((example) => example.name === FIRST) ?? examples[0];
+  const { name, sketch } = JSON.parse(embedded('first'));
+  const { toml } = examples.find((example) => example.name === name) ?? examples[0];
   byId('example').value = name;
-  if (!editor.goOn(store()?.getItem(KEPT))) editor.set(toml, null);
+  if (!editor.goOn(store()?.getItem(KEPT))) editor.set(toml, null, { name, text: toml });
+  // This one can be shown, and begins to move, before anything else is computed.
+  if (editor.value === toml && rigOfLink() === null) {
+    sketched(sketch);
+    live.show({ toml, motions: null });
+  }
   if (!openLink()) {
-    const said = byId('notice').textContent;
+    const said = [...byId('notice').childNodes];
     changed();
-    if (said !== '') notice(said, { isBad: true });
+    byId('notice').replaceChildren(...said);
+    byId('notice').hidden = said.length === 0;
   }
 }
 
-async function begin() {
-  const module = bytesOf('module');
+function begin() {
+  // The module is unpacked and compiled while the page is already shown.
+  const module = new Promise((take) => { requestAnimationFrame(() => setTimeout(take)); }).then(() => WebAssembly.compile(bytesOf('module')));
+  live = new Live(module, (properties) => imperfections.show(properties));
+  imperfections = new Imperfections(live);
   checker = new Thread(module);
   designer = new Thread(module);
   trust = new Trust(module);
-  twin = new Twin(module, (why) => tell(why, true));
+  twin = new Twin(module, (why) => tell(why, true), (isAway) => live.away(isAway));
   listen();
   addEventListener('pagehide', () => {
     // A store that is too small keeps nothing.
@@ -365,8 +416,9 @@ async function begin() {
   new Lessons(begins, (question) => designer.answerTo(question), () => twin.falls);
   first();
   twin.goOn(editor.value);
+  return module;
 }
 
 // For tests, and for the curious.
-globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, keptBytes: () => twin.kept?.kept.bytes.length ?? 0, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
+globalThis.upright = { desk, exported, motions, trusted: () => trust.laws, keptBytes: () => twin.kept?.kept.bytes.length ?? 0, live: () => live, ask: (question) => designer.answerTo(question), isBusy: () => checker === null || checker.isBusy || designer.isBusy };
 begin().catch((error) => tell(`this browser cannot compute the design: ${error.message}`, true));

@@ -1,4 +1,6 @@
-// The rig, the curves and the poles, as SVG.
+// The curves and the poles, as SVG.
+
+const { niceStep, roundValues } = modules['scale.js'];
 
 function svg(name, attributes, ...children) {
   const element = document.createElementNS('http://www.w3.org/2000/svg', name);
@@ -11,54 +13,8 @@ const curveColour = (number) => `var(--c${number % 6})`;
 
 const short = (value) => Number(value.toPrecision(6)).toString();
 
-// Draws the rig in a state (x, ẋ, θ_1, θ̇_1 …), seen at a fixed place with the cart in the middle.
-function drawRig(place, { lengths_m: lengths, travel_m: travel }, state, setpoint) {
-  const { width, height } = place.getBoundingClientRect();
-  if (width === 0) return undefined; // not shown
-  place.setAttribute('viewBox', `0 0 ${width} ${height}`);
-  if (lengths.length === 0) {
-    place.replaceChildren(svg('text', { x: width / 2, y: height / 2, 'text-anchor': 'middle' }, 'a linear model: no links to draw'));
-    return;
-  }
-  const reach = lengths.reduce((sum, length) => sum + length, 0);
-  const [x0, y0] = [width / 2, height - 40];
-  const scale = (0.88 * y0) / reach;
-  const at = ([x, y]) => [x0 + scale * x, y0 - scale * y];
-  const parts = [];
-  const line = (from, to, stroke, thickness) => {
-    const [[x1, y1], [x2, y2]] = [at(from), at(to)];
-    parts.push(svg('line', { x1, y1, x2, y2, stroke, 'stroke-width': thickness, 'stroke-linecap': 'round' }));
-  };
-  const far = width / scale;
-  const [low, high] = [travel[0] ?? -far, travel[1] ?? far];
-  line([Math.max(low, -far), 0], [Math.min(high, far), 0], 'var(--rule)', 4);
-  for (const end of [low, high]) line([end, -0.05 * reach], [end, 0.05 * reach], 'var(--ink)', 5);
-  const step = niceStep(90 / scale);
-  for (const tick of roundValues(-x0 / scale, x0 / scale, step)) {
-    const [x, y] = at([tick, 0]);
-    parts.push(svg('text', { x, y: y + 32, 'text-anchor': 'middle' }, `${Number(tick.toFixed(3))} m`));
-  }
-  if (setpoint !== null) line([setpoint, -0.11 * reach], [setpoint, -0.05 * reach], 'var(--link)', 4);
-  let [x, y, phi] = [state[0], 0, 0];
-  const [cx, cy] = at([x, y]);
-  parts.push(svg('rect', { x: cx - 27, y: cy - 11, width: 54, height: 22, rx: 4, fill: 'var(--reference)', stroke: 'var(--ink)' }));
-  const joints = [[x, y]];
-  lengths.forEach((length, link) => {
-    phi += state[2 + 2 * link];
-    const end = [x - length * Math.sin(phi), y + length * Math.cos(phi)];
-    line([x, y], end, curveColour(link), 7);
-    [x, y] = end;
-    joints.push(end);
-  });
-  for (const joint of joints) {
-    const [px, py] = at(joint);
-    parts.push(svg('circle', { cx: px, cy: py, r: 3.5, fill: 'var(--ink)' }));
-  }
-  place.replaceChildren(...parts);
-}
-
-// Axes and curves over time; `rows` has the time first.
-function drawCurves(place, curves, rows) {
+// Axes and curves over time; `rows` has the time first. `kept` has points [t, value] of other curves, if it is given.
+function drawCurves(place, curves, rows, kept = []) {
   const { width, height } = place.getBoundingClientRect();
   if (width === 0) return undefined; // not shown
   const [left, right, top, bottom] = [54, 8, 6, 18];
@@ -71,6 +27,7 @@ function drawCurves(place, curves, rows) {
       high = Math.max(high, value(row));
     }
   }
+  for (const [, value] of kept.flat()) [low, high] = [Math.min(low, value), Math.max(high, value)];
   const room = Math.max(0.08 * (high - low), 1e-6);
   [low, high] = [low - room, high + room];
   const x = (t) => left + ((width - left - right) * t) / end;
@@ -84,12 +41,42 @@ function drawCurves(place, curves, rows) {
   for (const t of roundValues(0, end, niceStep(end / 5))) {
     parts.push(svg('text', { x: Math.min(x(t), width - 18), y: height - 4, 'text-anchor': 'middle' }, `${Number(t.toFixed(2))} s`));
   }
+  kept.forEach((points) => {
+    const path = points.map(([t, value]) => `${x(Math.min(t, end)).toFixed(1)},${y(value).toFixed(1)}`).join(' ');
+    parts.push(svg('polyline', { points: path, fill: 'none', stroke: 'var(--muted)', 'stroke-width': 1.4, 'stroke-dasharray': '5 4' }));
+  });
   curves.forEach(({ value, colour }) => {
     const points = rows.map((row) => `${x(row[0]).toFixed(1)},${y(value(row)).toFixed(1)}`).join(' ');
     parts.push(svg('polyline', { points, fill: 'none', stroke: colour, 'stroke-width': 1.8, 'stroke-linejoin': 'round' }));
   });
   place.replaceChildren(...parts);
   return x;
+}
+
+// Two rigs at the same time of their runs, each { lengths, state }; the first one is only outlined.
+function drawTogether(place, rigs, [low, high]) {
+  const { width, height } = place.getBoundingClientRect();
+  if (width === 0) return undefined; // not shown
+  place.setAttribute('viewBox', `0 0 ${width} ${height}`);
+  const reach = Math.max(...rigs.map(({ lengths }) => lengths.reduce((sum, length) => sum + length, 0)));
+  const [x0, y0] = [width / 2, height - 16];
+  const scale = Math.min((0.9 * y0) / reach, (0.46 * width) / Math.max(-low, high));
+  const at = (x, y) => [x0 + scale * x, y0 - scale * y].map((value) => value.toFixed(1)).join(',');
+  const parts = [svg('line', { x1: x0 + scale * low, x2: x0 + scale * high, y1: y0, y2: y0, stroke: 'var(--rule)', 'stroke-width': 4 })];
+  rigs.forEach(({ lengths, state }, number) => {
+    const style = number === 0 ? { stroke: 'var(--muted)', 'stroke-width': 3, 'stroke-dasharray': '5 4' } : { stroke: 'var(--c0)', 'stroke-width': 5 };
+    let [x, y, angle] = [state[0], 0, 0];
+    const points = [at(x, y)];
+    lengths.forEach((length, link) => {
+      angle += state[2 + 2 * link];
+      [x, y] = [x - length * Math.sin(angle), y + length * Math.cos(angle)];
+      points.push(at(x, y));
+    });
+    parts.push(svg('rect', { x: x0 + scale * state[0] - 16, y: y0 - 7, width: 32, height: 14, fill: number === 0 ? 'none' : 'var(--reference)', stroke: style.stroke }));
+    parts.push(svg('polyline', { points: points.join(' '), fill: 'none', 'stroke-linejoin': 'round', ...style }));
+  });
+  place.replaceChildren(...parts);
+  return undefined;
 }
 
 // Poles in the complex plane, on a scale that shows near and far ones: the square root of each distance.

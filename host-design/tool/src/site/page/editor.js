@@ -1,5 +1,7 @@
 // The rig as text and as a form.
 
+const { inPieces, plain } = modules['words.js'];
+
 const byId = (id) => document.getElementById(id);
 
 function element(name, properties, ...children) {
@@ -8,11 +10,12 @@ function element(name, properties, ...children) {
   return made;
 }
 
-// Line numbers beside the text; the line of an error stands out. Whatever changes the text, undo takes it back.
+// Line numbers beside the text; the line of an error stands out. Whatever changes the text, undo takes it back. `origin`
+// is what the person began with: its name and text.
 class Editor {
   constructor(change) {
-    Object.assign(this, { change, text: byId('toml'), lines: byId('lines'), wrong: null, past: new Past() });
-    this.last = this.text.value;
+    Object.assign(this, { change, text: byId('toml'), lines: byId('lines'), wrong: null, past: new Past(), origin: { name: '', text: '' } });
+    this.last = this.state;
     this.text.addEventListener('input', () => { this.note('typing'); change(); });
     this.text.addEventListener('scroll', () => { this.lines.scrollTop = this.text.scrollTop; });
     // The browser's own undo knows nothing of texts that were not typed.
@@ -31,30 +34,36 @@ class Editor {
 
   get value() { return this.text.value; }
 
+  get state() { return { text: this.text.value, origin: this.origin }; }
+
+  // Whether a person has worked on it.
+  get isOwn() { return this.value.trim() !== '' && this.value !== this.origin.text; }
+
   // Another text; `kind` is what changes it, null what cannot be taken back.
-  set(text, kind) {
+  set(text, kind, origin = this.origin) {
+    this.origin = origin;
     if (this.text.value === text) return;
     const [top, at] = [this.text.scrollTop, this.text.selectionStart];
     this.text.value = text;
     this.text.setSelectionRange(at, at);
     this.text.scrollTop = top;
-    if (kind === null) this.last = text;
+    if (kind === null) this.last = this.state;
     this.note(kind);
   }
 
   // The text has changed.
   note(kind) {
-    if (this.text.value !== this.last) this.past.note(this.last, kind);
-    this.last = this.text.value;
+    if (this.text.value !== this.last.text) this.past.note(this.last, kind);
+    this.last = this.state;
     this.number();
     this.offer();
   }
 
   step(event, isBack) {
     event.preventDefault();
-    const text = this.past.step(this.text.value, isBack);
-    if (text === null) return;
-    this.set(text, null);
+    const to = this.past.step(this.state, isBack);
+    if (to === null) return;
+    this.set(to.text, null, to.origin);
     this.change();
   }
 
@@ -64,14 +73,14 @@ class Editor {
   }
 
   // The text and what it was before, as text, from which a page that is loaded again goes on.
-  kept() { return JSON.stringify({ text: this.value, before: this.past.before, after: this.past.after }); }
+  kept() { return JSON.stringify({ ...this.state, before: this.past.before, after: this.past.after }); }
 
   // Goes on from what was kept; returns whether there was something.
   goOn(kept) {
     try {
-      const { text, before, after } = JSON.parse(kept);
+      const { text, origin, before, after } = JSON.parse(kept);
       if (typeof text !== 'string') return false;
-      this.set(text, null);
+      this.set(text, null, origin);
       Object.assign(this.past, { before, after });
       this.offer();
       return true;
@@ -101,7 +110,7 @@ class Editor {
 // Where an error is.
 const placeOf = ({ line }) => (line === null ? 'this file: ' : `line ${line}: `);
 
-// Numbers of the rig as fields; `set(key, value, refuse)` changes one, or says why not.
+// Numbers of the rig as fields; `set(values, kind, refuse)` changes them, or says why not.
 class Form {
   constructor(set, refused) {
     Object.assign(this, { set, refused, keys: '' });
@@ -129,7 +138,7 @@ class Form {
     };
     input.addEventListener('change', () => {
       const { value, why } = numberOf(input.value);
-      if (why === undefined) this.set(key, String(value), refuse);
+      if (why === undefined) this.set([[key, String(value)]], key, refuse);
       else refuse(why);
     });
     return element('label', {}, `${label} (${unit})`, input, element('small', {}));
@@ -185,7 +194,7 @@ class Weights {
       const chosen = Number((10 ** Number(input.value)).toPrecision(2));
       input.dataset.value = chosen;
       this.say(key, chosen);
-      this.set(key, String(chosen));
+      this.set([[key, String(chosen)]], key);
     });
     return element('div', { className: 'slider' }, element('label', { htmlFor: input.id, textContent: label }), element('output', { id: `value-${key}` }), input);
   }

@@ -8,7 +8,7 @@ class Lessons {
     Object.assign(this, { begin, ask, falls, lesson: null, solved: new Set() });
     try { this.solved = new Set(JSON.parse(lastingStore()?.getItem(SOLVED) ?? '[]')); } catch {}
     const lessons = JSON.parse(embedded('lesson-data'));
-    byId('lessons').hidden = lessons.length === 0;
+    document.querySelector('[data-tab="lessons"]').hidden = lessons.length === 0;
     byId('lesson-list').replaceChildren(...lessons.map((lesson, number) => {
       const button = element('button', { type: 'button' });
       button.addEventListener('click', () => this.open(lesson, button));

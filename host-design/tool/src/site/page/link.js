@@ -24,7 +24,8 @@ function lastingStore() {
   try { return localStorage; } catch { return null; }
 }
 
-// A thread that computes. Of several questions that wait, only the last of each kind is asked.
+// A thread that computes, once the module is compiled. Of several questions that wait, only the last of each kind is
+// asked.
 class Thread {
   constructor(module) {
     const address = URL.createObjectURL(new Blob([JSON.parse(embedded('worker'))], { type: 'text/javascript' }));
@@ -39,7 +40,7 @@ class Thread {
       try { take(data.answer, data.ms); } finally { this.next(); }
     };
     this.ready = new Promise((take) => { this.asked = { take }; });
-    this.worker.postMessage({ id: 0, module });
+    module.then((compiled) => this.worker.postMessage({ id: 0, module: compiled }), () => {});
   }
 
   get isBusy() { return this.asked !== null || this.waiting.size > 0; }
@@ -52,11 +53,11 @@ class Thread {
   }
 
   // Runs a rig, from what was kept of it or null, or talks to the board at a line, for the page at the other end of the
-  // port.
-  run({ rig, kept }, theme, port, line, take) {
+  // port. With `keeps`, it hands out what it would go on from.
+  run({ rig, kept, keeps }, theme, port, line, take) {
     this.ready.then(() => {
       this.asked = { take };
-      this.worker.postMessage({ id: 'run', rig, theme, kept }, line === null ? [port] : [port, line]);
+      this.worker.postMessage({ id: 'run', rig, theme, kept, keeps }, line === null ? [port] : [port, line]);
     });
   }
 

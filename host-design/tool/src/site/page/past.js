@@ -6,21 +6,21 @@ const ONE_STEP_MS = 800; // changes of the same kind within this time are one st
 class Past {
   constructor() { Object.assign(this, { before: [], after: [], kind: null, at: -Infinity }); }
 
-  // The text was `text` before a change of this kind.
-  note(text, kind) {
+  // There was `state` before a change of this kind.
+  note(state, kind) {
     const now = performance.now();
     const goesOn = kind === this.kind && now - this.at < ONE_STEP_MS && this.before.length > 0;
     Object.assign(this, { kind, at: now, after: [] });
     if (goesOn) return;
-    this.before.push(text);
+    this.before.push(state);
     if (this.before.length > MOST_STEPS) this.before.shift();
   }
 
-  // The text one step back from `text`, or forth again; null where there is none.
-  step(text, isBack) {
+  // What was one step before `state`, or is one step after it again; null where there is none.
+  step(state, isBack) {
     const [from, to] = isBack ? [this.before, this.after] : [this.after, this.before];
     if (from.length === 0) return null;
-    to.push(text);
+    to.push(state);
     this.kind = null;
     return from.pop();
   }

@@ -40,12 +40,12 @@ class Changes {
   }
 }
 
-// Switches a rig on and keeps it running, from what was kept of it, if that is not null; returns why it cannot, if it
-// cannot.
-function run(rig, theme, port, kept) {
+// Switches a rig on and keeps it running, from what was kept of it, if that is not null, and `keeps` what a page that is
+// loaded again needs; returns why it cannot, if it cannot.
+function run(rig, theme, port, { kept, keeps }) {
   const told = answered('twin', { twin: 'start', ...rig });
   if (told.failed !== undefined) return told;
-  const changes = new Changes();
+  const changes = keeps ? new Changes() : null;
   if (kept !== null) changes.put(kept);
   let keptAt = performance.now();
   port.postMessage({ you: told.you, hello: { ...told.hello, theme } });
@@ -72,7 +72,7 @@ function run(rig, theme, port, kept) {
       port.postMessage({ notice: `the computation stopped (${error.message}); go back to the desk and balance it again` });
       return;
     }
-    if (begin - keptAt > KEPT_MS) {
+    if (keeps && begin - keptAt > KEPT_MS) {
       keptAt = begin;
       const kept = changes.taken();
       postMessage({ kept }, [kept.bytes.buffer]);

@@ -1,11 +1,9 @@
 // Answers questions with the module: its own thread, so that the page never waits.
 
-let bytes = null;
+let compiled = null;
 let exported = null;
 
-async function start() {
-  ({ instance: { exports: exported } } = await WebAssembly.instantiate(bytes, {}));
-}
+async function start() { ({ exports: exported } = await WebAssembly.instantiate(compiled, {})); }
 
 // Asks the module's function `name`.
 function answered(name, question) {
@@ -19,12 +17,12 @@ function answered(name, question) {
   return JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, from, length)));
 }
 
-onmessage = async ({ data: { id, question, module, rig, theme, kept }, ports: [port, line] }) => {
+onmessage = async ({ data: { id, question, module, rig, theme, kept, keeps }, ports: [port, line] }) => {
   const begin = performance.now();
   try {
-    if (module !== undefined) bytes = module;
+    if (module !== undefined) compiled = module;
     if (exported === null) await start();
-    if (rig !== undefined) return postMessage({ id, answer: line === undefined ? run(rig, theme, port, kept) : talk(rig, theme, port, line), ms: performance.now() - begin });
+    if (rig !== undefined) return postMessage({ id, answer: line === undefined ? run(rig, theme, port, { kept, keeps }) : talk(rig, theme, port, line), ms: performance.now() - begin });
     const answer = question === undefined ? {} : answered('answer', question);
     postMessage({ id, answer, ms: performance.now() - begin });
   } catch (error) {

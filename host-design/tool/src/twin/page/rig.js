@@ -42,15 +42,15 @@ export function context(canvas) {
 export class RigView {
   // `pull(body, along, x, y)`, `letGo()` and `moveTo(x)` carry out what the person does.
   constructor(canvas, rail, hello, act) {
-    Object.assign(this, { canvas, rail, hello, act });
-    this.reach = hello.lengths_m.reduce((sum, length) => sum + length, 0);
-    this.camera = null;
-    this.state = null;
-    this.trail = [];
-    this.grip = null;
-    this.body = hello.lengths_m.length;
-    this.keys = new Set();
+    Object.assign(this, { canvas, rail, act, camera: null, grip: null, keys: new Set() });
+    this.takes(hello);
     this.listen();
+  }
+
+  // Another rig comes to the same place.
+  takes(hello) {
+    Object.assign(this, { hello, state: null, trail: [], body: hello.lengths_m.length });
+    this.reach = hello.lengths_m.reduce((sum, length) => sum + length, 0);
   }
 
   // CSS pixels per metre.
@@ -333,7 +333,7 @@ export class RigView {
     draw.font = '600 14px system-ui, sans-serif';
     draw.textAlign = 'left';
     const [px, py] = this.toScreen(pull.to);
-    draw.fillText(`you: ${newtons(Math.hypot(...pull.force_n))}`, px + 10, py - 8);
+    draw.fillText(`${pull.by ?? 'you'}: ${newtons(Math.hypot(...pull.force_n))}`, px + 10, py - 8);
   }
 
   // The whole rail: click it to move the set-point.
