@@ -21,10 +21,11 @@ const MOST_COLUMNS_OF_A_COMMENT: usize = 120;
 const GENERATED: &str = "src/gains.rs";
 
 /// The folders of the crates, and what lies in such a folder without belonging to the crate.
-const CRATES: [(&str, &str); 12] = [
+const CRATES: [(&str, &str); 13] = [
     ("src/", "src/image/"),
     ("host-design/board/src/", ""),
     ("host-design/closed-loop/src/", ""),
+    ("host-design/command/src/", "host-design/command/src/main.rs"),
     ("host-design/design/src/", ""),
     ("host-design/identify/src/", ""),
     ("host-design/page/src/", ""),

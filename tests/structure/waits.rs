@@ -7,7 +7,8 @@ const UNLIMITED: [&str; 6] =
     [".output()", ".wait_with_output()", ".wait()", ".recv()", ".accept()", ".read_line("];
 
 /// The folders of tests and benches that wait for something.
-const FOLDERS: [&str; 8] = [
+const FOLDERS: [&str; 9] = [
+    "host-design/command/tests",
     "host-design/tool/tests",
     "host-design/design/tests",
     "host-design/identify/tests",

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use upright_command::progress::with_progress;
+use upright_command::project::checkout;
 use upright_design::design::DesignError;
 use upright_design::table::write_atomically;
 use upright_paper::{PaperRigs, ReproduceError, reproduce};
-use upright_tool::progress::with_progress;
-use upright_tool::project::checkout;
 
 /// Compares the results of the paper with ours, number by number, and writes its figures 5 to 8 and Table 2 as figures
 /// and data.

@@ -17,8 +17,6 @@
 //! | [`identified`] | results of an identification, as text, JSON, page and rig file |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`site`] | the whole of it in a page, with nothing to install |
-//! | [`progress`] | what a long computation tells meanwhile |
-//! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
 //! use upright_tool::figure::{Curve, Figure, Axis, Panel};
@@ -43,8 +41,6 @@ pub mod in_the_loop;
 pub mod markdown;
 pub mod monitor;
 mod policy;
-pub mod progress;
-pub mod project;
 pub mod report;
 pub mod simulator_model;
 pub mod site;

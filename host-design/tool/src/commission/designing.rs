@@ -18,7 +18,7 @@ use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::record::Journal;
 use crate::identified::{json, text};
-use crate::progress::{with_progress, with_spinner};
+use upright_command::progress::{with_progress, with_spinner};
 
 /// Duration of the runs that the gains have to survive (s).
 const RUN_S: f64 = 10.0;

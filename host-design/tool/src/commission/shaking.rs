@@ -12,7 +12,7 @@ use super::machine::Stop;
 use super::plan::CommissionPlan;
 use super::task::PersonTask;
 use crate::monitor::words;
-use crate::progress::with_spinner;
+use upright_command::progress::with_spinner;
 
 /// Time within which the firmware reports the cause of a fault.
 const CAUSE: Duration = Duration::from_millis(300);

@@ -16,7 +16,7 @@ use super::gains::CommittedGains;
 use super::kept;
 use super::limits::{check_table, counts, makes_tick};
 use super::uf2::uf2;
-use crate::project::checkout;
+use upright_command::project::checkout;
 
 /// The cargo profile that images are compiled with.
 pub const PROFILE: &str = "firmware";

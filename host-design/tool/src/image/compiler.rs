@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::error::{BuildError, NoCompiler, TARGET};
-use crate::project::NoCheckout;
-use crate::project::checkout;
+use upright_command::project::NoCheckout;
+use upright_command::project::checkout;
 
 /// Debian's compiler, which can build Rust's core library from `rust-web-src`.
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";

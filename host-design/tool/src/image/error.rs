@@ -7,7 +7,7 @@ use upright_closed_loop::conversation::words::joint;
 use upright_design::table::WriteError;
 
 use super::elf::ElfError;
-use crate::project::NoCheckout;
+use upright_command::project::NoCheckout;
 
 /// The target that images are compiled for: Cortex-M4 with single-precision floating point.
 pub const TARGET: &str = "thumbv7em-none-eabihf";

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use upright_design::rig::Rig;
 
 use super::error::BuildError;
-use crate::project::checkout;
+use upright_command::project::checkout;
 
 /// The committed gain table.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::image::NoCompiler;
-use crate::project::NoCheckout;
+use upright_command::project::NoCheckout;
 
 /// The target of the page's module.
 pub(super) const TARGET: &str = "wasm32-unknown-unknown";

@@ -2,7 +2,7 @@
 
 use super::error::{SiteError, TARGET};
 use crate::image::{Compiler, ForeignTarget, compiler_for};
-use crate::project::checkout;
+use upright_command::project::checkout;
 
 const BROWSER: ForeignTarget<'static> = ForeignTarget {
     names: &[TARGET],

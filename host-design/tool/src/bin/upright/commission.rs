@@ -16,11 +16,11 @@ use upright_tool::commission::{
 };
 use upright_tool::monitor::SerialLine;
 
-use crate::failure::Failure;
 use crate::firmware::lines_of_stdin;
-use crate::output::print;
 use crate::target::{Built, TargetOption};
 use crate::variation::with_table;
+use upright_command::Failure;
+use upright_command::print;
 
 /// Guides you from a wired rig to a balancing one, step by step: what to do, what was found, and whether it is right.
 ///

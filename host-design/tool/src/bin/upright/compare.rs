@@ -11,10 +11,10 @@ use upright_tool::compare::{
     ComparedConditions, ComparedRig, Sweep, compare, csv, figure, jobs, notes, table,
 };
 
-use crate::failure::Failure;
-use crate::output::print;
 use crate::variation::{finite, law_option, positive};
-use upright_tool::progress::with_bar;
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::with_bar;
 
 /// Compares designs: several rigs, or one key of a rig file swept over a range.
 ///

@@ -8,8 +8,8 @@ use upright_design::rig::Rig;
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::simulator_model::{mjcf, urdf};
 
-use crate::failure::Failure;
 use crate::variation::with_table;
+use upright_command::Failure;
 
 /// Writes the controller for programs that are not written in Rust, or the machine for a simulator.
 ///

@@ -14,12 +14,12 @@ use upright_tool::in_the_loop::RunPlace;
 
 use healthy::HealthyOptions;
 
-use crate::failure::Failure;
-use crate::output::print;
 use crate::split::Split;
 use crate::target::TargetOption;
 use crate::variation::{Variation, Wanted, with_stored_motions};
-use upright_tool::progress::with_bar;
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::with_bar;
 
 /// Fault injection: runs the firmware with one defect at a time and checks that the motor is off in time; exit status
 /// 1 if it ever is not, or is turned off without a reason.

@@ -15,7 +15,7 @@ pub(crate) use monitor::lines_of_stdin;
 
 use clap::{Args, Subcommand};
 
-use crate::failure::Failure;
+use upright_command::Failure;
 
 /// Builds, measures, runs, flashes and monitors the firmware image.
 #[derive(Args)]

@@ -13,10 +13,10 @@ use upright_tool::identified::{json, page, text};
 
 use coverage::CoverageOptions;
 
-use crate::failure::Failure;
 use crate::reading::ReadingArgs;
 use crate::variation::positive;
-use upright_tool::progress::with_progress;
+use upright_command::Failure;
+use upright_command::progress::with_progress;
 
 /// Identifies the parameters of the real machine from logs of the hanging machine being shaken, or from tables of its
 /// motion.

@@ -7,7 +7,7 @@ use clap::Args;
 use upright_design::table::write_atomically;
 use upright_tool::import::rig_file;
 
-use crate::failure::Failure;
+use upright_command::Failure;
 
 /// Writes a rig file for the machine in a URDF: a cart on a rail and a chain of hinges.
 ///

@@ -1,16 +1,13 @@
 //! The command-line tool: from a rig file to gains, gain table and closed loop.
 
-mod check;
 mod commission;
 mod compare;
-mod design;
+mod exit_status;
 mod export;
-mod failure;
 mod faults;
 mod firmware;
 mod identify;
 mod import;
-mod output;
 mod reading;
 mod report;
 mod robust;
@@ -27,9 +24,10 @@ mod verify;
 
 use std::process::ExitCode;
 
-use failure::Failure;
-
-use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use exit_status::exit_status;
+use upright_command::{CheckCommand, DesignCommand, Failure, with_negative_numbers};
+use variation::add_motions;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -64,9 +62,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum UprightCommand {
-    Check(check::CheckCommand),
+    Check(CheckCommand),
     Commission(commission::CommissionCommand),
-    Design(design::DesignCommand),
+    Design(DesignCommand),
     Export(export::ExportCommand),
     Faults(faults::FaultsCommand),
     Firmware(firmware::FirmwareCommand),
@@ -84,15 +82,6 @@ enum UprightCommand {
     Verify(verify::VerifyCommand),
 }
 
-/// Lets every option of a command take a number below 0, so that what refuses it says what is accepted.
-fn with_negative_numbers(command: Command) -> Command {
-    let takes_number = |arg: Arg| {
-        let is_option = !arg.is_positional() && arg.get_action().takes_values();
-        if is_option { arg.allow_negative_numbers(true) } else { arg }
-    };
-    command.mut_args(takes_number).mut_subcommands(with_negative_numbers)
-}
-
 /// What is an option of another command, and not a command.
 const OPTIONS: [(&str, &str); 2] =
     [("false-alarms", "faults --healthy"), ("coverage", "identify --coverage")];
@@ -100,14 +89,15 @@ const OPTIONS: [(&str, &str); 2] =
 fn main() -> ExitCode {
     let typed = std::env::args().nth(1);
     if let Some((name, option)) = OPTIONS.into_iter().find(|(name, _)| typed.as_deref() == Some(name)) {
-        return Failure::argument(format!("there is no command `{name}`: use `upright {option}`")).report();
+        return Failure::argument(format!("there is no command `{name}`: use `upright {option}`"))
+            .report(exit_status);
     }
     let matches = with_negative_numbers(Arguments::command()).get_matches();
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {
         UprightCommand::Check(command) => command.run(),
         UprightCommand::Commission(command) => command.run(),
-        UprightCommand::Design(command) => command.run(),
+        UprightCommand::Design(command) => command.run(add_motions),
         UprightCommand::Export(command) => command.run(),
         UprightCommand::Faults(command) => command.run(),
         UprightCommand::Firmware(command) => command.run(),
@@ -126,6 +116,6 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+        Err(failure) => failure.report(exit_status),
     }
 }

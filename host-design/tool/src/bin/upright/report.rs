@@ -14,10 +14,10 @@ use upright_trust::verify::{Effort, trust};
 
 use super::swing_up::with_margins;
 use super::verify::search;
-use crate::failure::Failure;
-use crate::output::print;
 use crate::variation::{Variation, Wanted, with_stored_motions};
-use upright_tool::progress::{with_progress, with_spinner};
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::{with_progress, with_spinner};
 
 /// Writes one HTML page about a rig and its loop: animated runs, model, gains, margins, trust report.
 ///

@@ -11,11 +11,11 @@ use upright_design::table::{Gains, write_atomically};
 use upright_tool::figure::front_figure;
 use upright_trust::robust::{Choice, JudgeSettings, Judgement, RobustError, choose, judge, rewritten};
 
-use crate::failure::Failure;
-use crate::output::print;
 use crate::split::Split;
 use crate::variation::{not_negative, positive, with_table};
-use upright_tool::progress::{with_progress, with_spinner};
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::{with_progress, with_spinner};
 
 mod text;
 

@@ -14,11 +14,11 @@ use upright_identify::{LineError, Log, OverLine, shake};
 use upright_tool::in_the_loop::run_shaken;
 use upright_tool::monitor::{SerialLine, now};
 
-use crate::failure::Failure;
-use crate::output::warn_of_an_arm;
 use crate::target::TargetOption;
 use crate::variation::with_table;
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
+use upright_command::warn_of_an_arm;
 
 /// Shakes the hanging machine, and writes its log for `upright identify`.
 ///

@@ -13,9 +13,9 @@ use upright_plan::{Demonstration, Script};
 use upright_tool::figure::run_svg;
 use upright_tool::in_the_loop::RunError;
 
-use crate::failure::Failure;
 use crate::variation::{Variation, Wanted, finite, law_option, not_negative, positive, with_stored_motions};
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
 
 /// Runs the firmware's own controller against the nonlinear plant.
 ///

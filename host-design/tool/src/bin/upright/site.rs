@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use upright_command::project::checkout;
 use upright_design::table::write_atomically;
-use upright_tool::project::checkout;
 use upright_tool::site::{examples, lessons, module, page};
 
-use crate::failure::Failure;
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
 
 /// Writes a page that designs rigs in the browser, with nothing to install.
 ///

@@ -7,7 +7,7 @@ use serde_json::Value;
 use upright_design::rig::Rig;
 use upright_design::study::{Shard, Study, about};
 
-use crate::failure::Failure;
+use upright_command::Failure;
 
 #[derive(Args)]
 pub(crate) struct Split {

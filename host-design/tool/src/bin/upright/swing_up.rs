@@ -18,10 +18,10 @@ use upright_plan::{
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
 use upright_tool::in_the_loop::RunError;
 
-use crate::failure::Failure;
-use crate::output::{print, warn_of_an_arm};
 use crate::split::Split;
-use upright_tool::progress::{with_bar, with_progress, with_spinner};
+use upright_command::Failure;
+use upright_command::progress::{with_bar, with_progress, with_spinner};
+use upright_command::{print, warn_of_an_arm};
 
 /// Plans the motions with which the rig raises itself from hanging to upright, and lowers itself again.
 ///

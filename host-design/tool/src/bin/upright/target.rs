@@ -10,8 +10,8 @@ use upright_design::table::TableValues;
 use upright_tool::image;
 use upright_tool::in_the_loop::RunPlace;
 
-use crate::failure::Failure;
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
 
 /// Where the firmware runs.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -14,9 +14,9 @@ use upright_plan::{
     motions, on_route, route_runs,
 };
 
-use crate::failure::Failure;
-use crate::output::{print, warn_of_an_arm};
-use upright_tool::progress::{with_progress, with_spinner};
+use upright_command::Failure;
+use upright_command::progress::{with_progress, with_spinner};
+use upright_command::{print, warn_of_an_arm};
 
 /// Plans motions between any two equilibria, in which each link is up or down, and tries them one after the other.
 ///

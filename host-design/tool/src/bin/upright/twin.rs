@@ -15,9 +15,9 @@ use upright_tool::in_the_loop::RunPlace;
 use upright_tool::monitor::SerialLine;
 use upright_tool::twin::{Server, SimulatedMachine};
 
-use crate::failure::Failure;
 use crate::target::TargetOption;
 use crate::variation::{Variation, Wanted, law_option, positive, with_stored_motions};
+use upright_command::Failure;
 
 /// Serves a page on which the rig moves, run by the firmware itself: pull it, change it, break it, watch it.
 ///

@@ -10,8 +10,8 @@ use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_plan::{Stored, StoredTransitions, SwingUpError, motions, with_motions};
 
-use crate::failure::Failure;
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
 
 #[derive(Args)]
 pub(crate) struct Variation {
@@ -114,6 +114,21 @@ impl Wanted {
     pub(crate) fn from_option(transitions: bool) -> Self {
         if transitions { Self::Transitions } else { Self::SwingUp }
     }
+}
+
+/// The table of `upright design` with the motions that are stored beside the rig file, which have to be there.
+pub(crate) fn add_motions(
+    rig_file: &Path,
+    rig: &Rig,
+    table: TableValues,
+    transitions: bool,
+) -> Result<TableValues, Failure> {
+    let table = with_stored_motions(rig_file, rig, table, Wanted::from_option(transitions))?;
+    if table.swing_up.is_none() {
+        let source = Stored::beside(rig_file).err().unwrap_or(SwingUpError::Outdated);
+        return Err(Failure::of_rig(rig_file.display(), source));
+    }
+    Ok(table)
 }
 
 /// The table with the motions that are stored beside the rig file.

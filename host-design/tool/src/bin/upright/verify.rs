@@ -14,11 +14,11 @@ use upright_trust::verify::{
     sample, spread, trust,
 };
 
-use crate::failure::Failure;
-use crate::output::print;
 use crate::split::Split;
 use crate::variation::{Variation, law_option};
-use upright_tool::progress::{with_bar, with_progress, with_spinner};
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::{with_bar, with_progress, with_spinner};
 
 mod imperfections;
 mod text;

@@ -7,11 +7,11 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_trust::robust::{FalseAlarms, Machines, false_alarms};
 
-use crate::failure::Failure;
-use crate::output::print;
 use crate::split::Split;
 use crate::variation::{Variation, law_option, positive};
-use upright_tool::progress::with_bar;
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::with_bar;
 
 /// Number of machines for each law.
 const MACHINES: u64 = 20;

@@ -4,8 +4,8 @@ use clap::Args;
 use serde_json::json;
 use upright::boards::{BOARDS, BoardRow, Family};
 
-use crate::failure::Failure;
-use crate::output::print;
+use upright_command::Failure;
+use upright_command::print;
 
 /// Lists the boards that there is an image for: what each can do, and where its image has been executed.
 #[derive(Args)]

@@ -8,8 +8,8 @@ use clap::Args;
 use super::board::BoardOption;
 use super::built::built;
 use super::cycles::check_ticks;
-use crate::failure::Failure;
 use crate::variation::Wanted;
+use upright_command::Failure;
 
 /// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
 /// tick takes longer than a quarter of its period. For a Pico or Pico 2, it prints the path of the UF2 file, beside

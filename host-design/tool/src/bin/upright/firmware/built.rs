@@ -7,9 +7,9 @@ use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{self, BuiltImage, CommittedGains};
 
-use crate::failure::Failure;
 use crate::variation::{Wanted, with_stored_motions, with_table};
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
 
 /// An image, and the rig and table that it is built from; none if it has src/gains.rs and that is made from no rig in
 /// `rigs/`.

@@ -17,11 +17,11 @@ use upright_trust::verify::at_rest_disturbed;
 
 use super::board::BoardOption;
 use super::built::{ForRig, designed};
-use crate::failure::Failure;
-use crate::output::print;
 use crate::target::read;
 use crate::variation::{Wanted, law_option, positive};
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::with_spinner;
 
 /// Measures what the ticks of the flashed image cost, on the virtual board: latency from the tick to the output,
 /// jitter of the output, and the whole task by part. The run goes from power-up through arming to balancing, and

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use upright::boards::BoardRow;
 
-use crate::failure::Failure;
+use upright_command::Failure;
 
 /// A file that the boot loader puts on its drive. A line of it names the board.
 const INFO: &str = "INFO_UF2.TXT";

@@ -10,8 +10,8 @@ use super::board::BoardOption;
 use super::built::built;
 use super::cycles::check_ticks;
 use super::drive::copy_to_drive;
-use crate::failure::Failure;
 use crate::variation::Wanted;
+use upright_command::Failure;
 
 const PROBE_RS: &str = "probe-rs";
 

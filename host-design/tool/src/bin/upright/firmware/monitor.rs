@@ -21,9 +21,9 @@ use upright_tool::monitor::record::{TelemetryCsv, json};
 use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};
 
 use super::built::designed;
-use crate::failure::Failure;
 use crate::twin;
 use crate::variation::{Wanted, positive};
+use upright_command::Failure;
 
 /// Shows the telemetry of a firmware live and sends commands to it; exit status 1 if the connection is lost or the
 /// firmware uses another version of the messages.

@@ -11,10 +11,10 @@ use upright_design::simulate::Scenario;
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::{RunError, RunPlace, VirtualBoard, run, run_compared, serve};
 
-use crate::failure::Failure;
 use crate::simulate::SimulateCommand;
 use crate::target::TargetOption;
-use upright_tool::progress::with_spinner;
+use upright_command::Failure;
+use upright_command::progress::with_spinner;
 
 /// Builds the image that is flashed, and runs it on the virtual board with the nonlinear plant; exit status 1 if the
 /// pendulum falls, or if a bit differs from the firmware on the host.

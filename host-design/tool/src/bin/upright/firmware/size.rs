@@ -11,9 +11,9 @@ use upright_tool::image::{
 
 use super::board::BoardOption;
 use super::built::built;
-use crate::failure::Failure;
-use crate::output::print;
 use crate::variation::Wanted;
+use upright_command::Failure;
+use upright_command::print;
 
 /// Measures the image of a board: flash and RAM by section and by crate, a bound on its stack, and whether it can
 /// panic; exit status 1 if it may take more stack than is reserved, or if it can panic or allocate. An image that does

@@ -8,11 +8,11 @@ use upright_design::rig::Rig;
 use upright_design::study::Study;
 use upright_identify::{Coverage, Drawn, TrueFriction, coverage};
 
-use crate::failure::Failure;
-use crate::output::print;
 use crate::split::Split;
 use crate::variation::not_negative;
-use upright_tool::progress::with_bar;
+use upright_command::Failure;
+use upright_command::print;
+use upright_command::progress::with_bar;
 
 /// What `--coverage` takes.
 #[derive(Args)]

@@ -9,14 +9,12 @@ use upright_design::design::{Assessment, DesignPoles, design};
 use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, SimulationError, Summary, simulate};
 use upright_design::table::{Gains, TableValues, gains_source, identity_differences, write_atomically};
-use upright_plan::{Stored, SwingUpError};
-use upright_tool::project::gain_table;
 
 use crate::failure::Failure;
 use crate::output::{print, warn_of_unusual_values};
-use crate::variation::{Wanted, with_stored_motions};
+use crate::progress::with_spinner;
+use crate::project::gain_table;
 use law_report::LawReport;
-use upright_tool::progress::with_spinner;
 
 mod data;
 mod law_report;
@@ -34,7 +32,7 @@ Examples:
   upright design my.toml --swing-up                       with the motions of `upright swing-up my.toml`
   upright design rigs/quadruple-paper.toml --check        exit status 1 if src/gains.rs differs
   upright design my.toml --json --no-write | jq .sampled.lqr.K")]
-pub(crate) struct DesignCommand {
+pub struct DesignCommand {
     /// Rig file (TOML)
     rig: PathBuf,
     /// Write the table here [default: src/gains.rs of the crate in this folder, or of the checkout around it]
@@ -57,8 +55,22 @@ pub(crate) struct DesignCommand {
     json: bool,
 }
 
+/// Adds the motions that are stored beside a rig file to its table: those between other equilibria, too, if the last
+/// argument says so.
+pub type AddMotions = fn(&Path, &Rig, TableValues, bool) -> Result<TableValues, Failure>;
+
 impl DesignCommand {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    /// Whether planned motions are to be in the table.
+    pub fn wants_motions(&self) -> bool {
+        self.swing_up || self.transitions
+    }
+
+    /// Runs the command; `add_motions` is called if it [wants motions](Self::wants_motions).
+    ///
+    /// # Errors
+    /// [`Failure`] for an invalid rig file, if there is no design or no place for its table, if the closed loop falls,
+    /// or if the table's file differs from what --check expects.
+    pub fn run(self, add_motions: AddMotions) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
         // Before the work, which is in vain where there is no place for its result.
         let path = match (self.no_write, &self.out) {
@@ -89,12 +101,8 @@ impl DesignCommand {
         if reports.iter().any(|report| report.run.is_none()) {
             return Err(Failure::of_rig(name(), SimulationError::NoObserver));
         }
-        if self.swing_up || self.transitions {
-            table = with_stored_motions(&self.rig, &rig, table, Wanted::from_option(self.transitions))?;
-        }
-        if (self.swing_up || self.transitions) && table.swing_up.is_none() {
-            let source = Stored::beside(&self.rig).err().unwrap_or(SwingUpError::Outdated);
-            return Err(Failure::of_rig(name(), source));
+        if self.wants_motions() {
+            table = add_motions(&self.rig, &rig, table, self.transitions)?;
         }
         warn_of_tick(&rig);
         let source = gains_source(&rig, &table);

@@ -1,7 +1,7 @@
 //! Finds the checkout of the project, which holds the source of the firmware.
 //!
 //! ```
-//! let project = upright_tool::project::checkout()?;
+//! let project = upright_command::project::checkout()?;
 //! assert!(project.join("src/gains.rs").is_file());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -18,7 +18,7 @@ Examples:
   upright check rigs/quadruple-paper.toml
   upright check my.toml --json | jq .plant
   upright check --keys")]
-pub(crate) struct CheckCommand {
+pub struct CheckCommand {
     /// Rig file (TOML)
     #[arg(required_unless_present = "keys")]
     rig: Option<PathBuf>,
@@ -31,7 +31,11 @@ pub(crate) struct CheckCommand {
 }
 
 impl CheckCommand {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`Failure`] for an invalid rig file, or if stdout is closed.
+    pub fn run(self) -> Result<(), Failure> {
         let Some(file) = self.rig else {
             return Ok(write!(std::io::stdout(), "{}", key_table())?);
         };
