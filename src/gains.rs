@@ -29,7 +29,7 @@ pub const SENSORS: usize = 5;
 #[rustfmt::skip]
 pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
     // Layout of the table: `TABLE_FORMAT` of the writer.
-    format: upright::table_format!(17),
+    format: upright::table_format!(18),
     // Numbers of states and sensors; equal to `NX` and `NY` in a sound table.
     dimensions: [10, 5],
     // Index of the state that follows the set-point.
@@ -176,8 +176,67 @@ pub static TABLE: GainTable<STATES, SENSORS> = GainTable {
             energy: 1.2662925e-7,
         },
     },
+    // How the motor stills the links; none for a `[model]`, and where no sensor measures that they hang.
+    stilling: Some(StillingGains {
+        // Longest time for which the links are stilled after a fall (ticks); 0: the motor goes off instead.
+        after_fall_ticks: 0,
+        // Stiffness of the spring that pulls the base to the middle (N/m).
+        stiffness: 12.391427,
+        // Constant of the damper on the base (N s/m).
+        damping: 3.4751925,
+        // Largest forces of spring and damper (N).
+        most_n: [12.0, 8.0],
+        // Dry friction of the base that the motor makes up for (N).
+        friction_n: 0.0,
+        // The lighter base that the motor imitates; none: it is only spring and damper.
+        imitated: Some(ImitatedBase {
+            // Mass that the motor takes away (kg), and viscous friction (N s/m); 0 for a drive that imposes the base's
+            // acceleration.
+            taken: [0.082, 0.0],
+            // The links on this base. One link more than there are, of inertia 1 and without weight, is at rest.
+            model: ChainModel {
+                // 1 / M_t, M_t the mass of cart and links together (1/kg).
+                inverse_mass: 2.3923445,
+                // a_j = Σ_i m_i r_i h_ij, with r_i = 1 on a cart and the radius of link i on an arm (kg m).
+                a: columns([[0.0105, 0.01, 0.0105, 0.005, 0.0]]),
+                // g Σ_i m_i h_ij (N m).
+                weight: columns([[0.103005, 0.0981, 0.103005, 0.04905, 0.0]]),
+                // b_jk = Σ_i m_i h_ij h_ik + δ_jk I_j, symmetric (kg m²).
+                b: columns([
+                    [0.0003, 0.0003, 0.000315, 0.00015, 0.0],
+                    [0.0003, 0.00037333334, 0.00042, 0.0002, 0.0],
+                    [0.000315, 0.00042, 0.0006533333, 0.00035, 0.0],
+                    [0.00015, 0.0002, 0.00035, 0.00033333333, 0.0],
+                    [0.0, 0.0, 0.0, 0.0, 1.0],
+                ]),
+                // b_jk - a_j a_k / M_t, symmetric (kg m²).
+                b_reduced: columns([
+                    [3.624402e-5, 4.8803828e-5, 5.124402e-5, 2.4401914e-5, 0.0],
+                    [4.8803828e-5, 0.00013409888, 0.00016880383, 8.038277e-5, 0.0],
+                    [5.124402e-5, 0.00016880383, 0.00038957736, 0.00022440191, 0.0],
+                    [2.4401914e-5, 8.038277e-5, 0.00022440191, 0.00027352473, 0.0],
+                    [0.0, 0.0, 0.0, 0.0, 1.0],
+                ]),
+                // What the links' accelerations add to the cart's equation: a_j, or 0 where the drive imposes the cart's
+                // acceleration (kg m).
+                reaction: columns([[0.0105, 0.01, 0.0105, 0.005, 0.0]]),
+                // d_0, viscous friction of the cart (N s/m).
+                cart_friction: 0.0,
+                // d_i, viscous friction of each joint on its relative rate (N m s/rad).
+                joint_frictions: columns([[0.0, 0.0, 0.0, 0.0, 0.0]]),
+                // What the turning of an arm adds; none on a cart.
+                turning: None,
+            },
+        }),
+        // Deceleration of the base by the motor's largest force that is counted on near an end of the rail (m/s²).
+        braking_m_per_s2: 26.666666,
+        // Largest speed of the base (m/s): no stilling from the energy that it is for is faster.
+        speed_m_per_s: 12.528368,
+        // Lowest and highest position of the base (m).
+        rail_m: [-1.975, 1.975],
+    }),
     // CRC-32 of all values above.
-    crc: 0x16fb_e097,
+    crc: 0xb92d_4d99,
 };
 
 /// This table has no swing-up.

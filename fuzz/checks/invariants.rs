@@ -93,12 +93,13 @@ impl Invariants {
             );
         }
         if enable {
-            let may = [State::Jogging, State::Identifying, State::Armed, State::Balancing];
+            let may = [State::Jogging, State::Identifying, State::Armed, State::Balancing, State::Stilling];
             assert!(may.contains(&before), "motor on after {before:?}");
             // Found in the second half of the tick; the motor is off from the next one.
             let late =
                 firmware.cause().is_some_and(|cause| matches!(cause.fault, Fault::LinkLost | Fault::Table));
-            let goes_on = matches!(after, State::Jogging | State::Identifying | State::Balancing);
+            let goes_on =
+                matches!(after, State::Jogging | State::Identifying | State::Balancing | State::Stilling);
             assert!(goes_on || disarmed || late, "motor on in {after:?}");
             let contacts = rig.contacts;
             assert!(!contacts.emergency_stop && !contacts.driver_fault);
@@ -108,7 +109,14 @@ impl Invariants {
             assert_eq!(drive, Drive::OFF);
             assert_ne!(after, State::Balancing, "balancing with the motor off");
         }
-        let on = [State::Jogging, State::Identifying, State::Armed, State::Balancing, State::Homing];
+        let on = [
+            State::Jogging,
+            State::Identifying,
+            State::Armed,
+            State::Balancing,
+            State::Homing,
+            State::Stilling,
+        ];
         let is_off = !on.contains(&after);
         assert!(!disarmed || is_off, "{after:?}");
     }

@@ -26,4 +26,5 @@ pub mod friction;
 pub mod motion;
 pub mod observer;
 mod rejected;
+pub mod spring_damper;
 pub mod state_feedback;

@@ -32,7 +32,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         let done = |result: Result<(), _>| result.map_or_else(Answer::NotNow, |()| Answer::Done);
         let rejected = |reason| Answer::Rejected(InvalidRequest::Controller(reason));
         let taken = |result: Result<(), _>| result.map_or_else(rejected, |()| Answer::Done);
-        if let Request::Arm | Request::Goto(_) | Request::Shake(_) = command.request {
+        if let Request::Arm | Request::Goto(_) | Request::Shake(_) | Request::Still = command.request {
             self.restart_lockout();
         }
         match command.request {
@@ -73,6 +73,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             }
             Request::Shake(shaking) => self.begin_shaking(shaking, command.id),
             Request::Forces { first, forces } => self.take_forces(first, &forces),
+            Request::Still => done(self.begin_stilling(command.id)),
             Request::Log(is_kept) => {
                 self.keep_log(is_kept);
                 Answer::Done
@@ -128,7 +129,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     /// released for `still_ticks`. The time for which homing wants everything still also serves for this; there is no
     /// need for another setting in the rig file.
     fn restart_lockout(&mut self) {
-        if self.supervisor.state() == State::Fault || self.rearm_lockout_ticks > 0 {
+        let has_fallen = self.supervisor.fault().is_some();
+        if has_fallen || self.rearm_lockout_ticks > 0 {
             self.rearm_lockout_ticks = self.table.limits.still_ticks;
         }
     }
@@ -137,7 +139,7 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
     #[inline(never)]
     pub(super) fn held_inhibit(&self, id: u64) -> Inhibits {
         let is_held = self.rearm_lockout_ticks > 0 || id <= self.last_clear_id;
-        Inhibits::HELD.when(is_held && self.supervisor.state() != State::Fault)
+        Inhibits::HELD.when(is_held && self.supervisor.fault().is_none())
     }
 
     /// Inhibits of clearing: conditions that would trip the fault again at once.

@@ -30,7 +30,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             self.slow_drive.stop();
             return Output::OFF;
         }
-        let holds = matches!(self.supervisor.state(), State::Homing | State::Calibrated | State::Armed);
+        let state = self.supervisor.state();
+        let holds = matches!(state, State::Homing | State::Calibrated | State::Armed | State::Stilling);
         if !holds && !self.slow_drive.is_moving() {
             return Output::OFF;
         }
@@ -45,7 +46,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
             || driver_fault
             || clock_fault
             || board_fault
-            || self.supervisor.fault().is_some_and(|fault| !fault.leaves_drive_working())
+            || (self.supervisor.state() == State::Fault
+                && self.supervisor.fault().is_some_and(|fault| !fault.leaves_drive_working()))
     }
 
     /// A drive with pulses is to let go of the cart: nobody knows where it is from then on.

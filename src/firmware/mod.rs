@@ -34,6 +34,7 @@ mod idle_drive;
 mod jog;
 mod posture;
 mod shake;
+mod still;
 mod swing_up;
 mod telemetry;
 mod tick_log;
@@ -54,6 +55,7 @@ use crate::supervision::inhibits::Inhibits;
 use crate::supervision::jog::{Jog, MotorSign};
 use crate::supervision::shaking::Shaker;
 use crate::supervision::slow_drive::SlowDrive;
+use crate::supervision::stilling::Stiller;
 use crate::supervision::supervisor::{State, Supervisor};
 use crate::table::{ChecksumScan, Equilibrium, GainTable, NoSwingUp, SwingUp};
 
@@ -110,11 +112,12 @@ pub struct Firmware<'t, const NX: usize, const NY: usize, S = NoSwingUp> {
     /// The tick of the board's timer (s).
     timer_tick_s: f32,
     shaker: Shaker<NY>,
+    stiller: Stiller<NY>,
     /// A drive with pulses, while no control law commands it.
     slow_drive: SlowDrive,
     /// Whether a control law has commanded it since.
     is_controlled: bool,
-    /// Motor voltage of the previous tick, while the rig is shaken (V).
+    /// Motor voltage of the previous tick, while the rig is shaken or stilled (V).
     last_volts: f32,
     /// Logged ticks that are not yet sent; `None` while no log is kept.
     log: Option<TickLog<NY>>,
@@ -188,6 +191,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             ticks_to_telemetry: 0,
             timer_tick_s: table.tick_s,
             shaker: Shaker::default(),
+            stiller: Stiller::default(),
             slow_drive: SlowDrive::default(),
             is_controlled: false,
             last_volts: 0.0,
@@ -278,6 +282,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         match self.supervisor.state() {
             State::Jogging => self.push_cart(inputs),
             State::Identifying => self.shake(inputs),
+            State::Stilling => self.still(inputs),
             state if !state.motor_is_on() => self.tick_motor_off(),
             _ => {}
         }
@@ -289,7 +294,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.output = match self.supervisor.state() {
             State::Balancing => self.balance(inputs),
             State::Jogging => self.output,
-            State::Identifying => self.output,
+            State::Identifying | State::Stilling => self.output,
             State::Raising | State::Holding | State::Lowering if S::IS_POSSIBLE => self.move_links(inputs),
             _ => Output::OFF,
         };
@@ -332,6 +337,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             | State::Holding
             | State::Lowering
             | State::Identifying
+            | State::Stilling
             | State::Fault => {}
         }
     }
@@ -396,6 +402,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         reply
     }
 
+    /// Latches a fault; after a fall, the motor goes on to still the links where the table allows it.
     #[cold]
     fn trip(&mut self, fault: Fault, sensor: Option<u8>) {
         if self.supervisor.state() != State::Fault {
@@ -408,8 +415,11 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         }
         self.calibration.cancel();
         self.setpoint_commanded = false;
-        self.supervisor.trip(Cause { fault, tick: self.tick, sensor });
-        self.let_go();
+        let cause = Cause { fault, tick: self.tick, sensor };
+        if !self.stills_after(cause) {
+            self.supervisor.trip(cause);
+            self.let_go();
+        }
     }
 
     /// A tick of homing by the limit switches.

@@ -71,15 +71,29 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
 
     /// The same, but without the check of the motor's sign: for the jog, which makes that check.
     pub(super) fn inhibits_before_motor_check(&self) -> Inhibits {
+        self.inhibits_of_moving_rig().union(Inhibits::MOVING.when(self.moves()))
+    }
+
+    /// The same for a rig that may move.
+    fn inhibits_of_moving_rig(&self) -> Inhibits {
         let state = self.supervisor.arming_inhibits();
         if self.supervisor.state().motor_is_on() {
             return state;
         }
-        let moves = self.calibration.slow_ticks() < self.table.limits.arm_ticks / MOVING_PART_OF_ARM_TICKS;
         state
             .union(Inhibits::SIGNS.when(self.calibration.signs() != Signs::Checked))
-            .union(Inhibits::MOVING.when(moves))
             .union(self.input_inhibits())
             .union(Inhibits::NO_OBSERVER.when(self.table.observer.is_none()))
+    }
+
+    /// Inhibits of stilling links that move.
+    pub(super) fn inhibits_in_motion(&self) -> Inhibits {
+        let is_unchecked = self.jog.sign() != MotorSign::Checked;
+        self.inhibits_of_moving_rig().union(Inhibits::MOTOR.when(is_unchecked))
+    }
+
+    /// Whether the rig has not been slow for long enough to begin anything.
+    pub(super) fn moves(&self) -> bool {
+        self.calibration.slow_ticks() < self.table.limits.arm_ticks / MOVING_PART_OF_ARM_TICKS
     }
 }

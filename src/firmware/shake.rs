@@ -3,6 +3,7 @@
 use super::Firmware;
 use crate::board::{Inputs, Output};
 use crate::control::actuator::Drive;
+use crate::control::state_feedback::saturate;
 use crate::protocol::message::{Answer, InvalidRequest};
 use crate::supervision::calibration::links_hang;
 use crate::supervision::inhibits::Inhibits;
@@ -59,7 +60,8 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
         match self.shaker.update(self.tick, &counts, &table.sensors, &table.limits, table.tick_s) {
             Ok(Some(force_n)) => {
-                let (drive, applied_n) = self.actuate(force_n);
+                let most = SPEED_SHARE * table.limits.speed_m_per_s;
+                let (drive, applied_n) = self.actuate(force_n, self.shaker.speed_m_per_s(), most);
                 (self.requested_n, self.applied_n) = (force_n, applied_n);
                 self.output = Output::on(drive, &self.table.drive);
             }
@@ -68,20 +70,23 @@ impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, 
         }
     }
 
-    /// The motor command for this force (N) on the moving cart, and the force that it produces (N); for a drive with
-    /// pulses, those of an acceleration (m/s²).
-    fn actuate(&mut self, force_n: f32) -> (Drive, f32) {
+    /// The motor command for this force (N) on the cart at this speed (m/s), and the force that it produces (N); for a
+    /// drive with pulses, those of an acceleration (m/s²) that makes the cart no faster than `most_m_per_s`.
+    pub(super) fn actuate(&mut self, force_n: f32, speed_m_per_s: f32, most_m_per_s: f32) -> (Drive, f32) {
         match &self.table.drive {
-            DriveMap::Force(_) => (Drive::Force(force_n), force_n),
+            DriveMap::Force(map) => {
+                let applied_n = saturate(force_n, map.limit_n);
+                (Drive::Force(applied_n), applied_n)
+            }
             DriveMap::Volts(motor) => {
-                let speed = self.shaker.speed_m_per_s();
-                let (volts, applied_n) = motor.volts_and_force(force_n, speed, self.last_volts);
+                let limited_n = saturate(force_n, motor.force.limit_n);
+                let (volts, applied_n) = motor.volts_and_force(limited_n, speed_m_per_s, self.last_volts);
                 self.last_volts = volts;
                 (Drive::Duty(motor.duty(volts)), applied_n)
             }
             DriveMap::Pulses(steps) => {
-                let most = SPEED_SHARE * self.table.limits.speed_m_per_s;
-                let map = StepMap { speed_limit_m_per_s: steps.speed_limit_m_per_s.min(most), ..*steps };
+                let map =
+                    StepMap { speed_limit_m_per_s: steps.speed_limit_m_per_s.min(most_m_per_s), ..*steps };
                 let (applied, pulses) = self.slow_drive.accelerate(force_n, &map, self.table.tick_s);
                 (Drive::Steps(pulses), applied)
             }

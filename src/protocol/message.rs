@@ -19,7 +19,7 @@ use crate::supervision::supervisor::State;
 use crate::table::{Equilibrium, Law};
 
 /// Version of these messages; a host with another version must not send commands.
-pub const PROTOCOL: u8 = 9;
+pub const PROTOCOL: u8 = 10;
 
 /// A command, host to firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -86,6 +86,8 @@ pub enum Request {
     },
     /// Start sending a log of every tick (`true`), or stop (`false`).
     Log(bool),
+    /// [Still](crate::supervision::stilling) links that swing or tumble.
+    Still,
 }
 
 /// A message, firmware to host.

@@ -54,6 +54,7 @@ fn requests() -> Vec<Request> {
         Request::Shake(shaking),
         Request::Forces { first: 513, forces },
         Request::Log(true),
+        Request::Still,
     ]
 }
 

@@ -307,6 +307,12 @@ impl Fault {
         ALL.get(self as usize - 1).unwrap_or(&ALL[0])
     }
 
+    /// Whether the rig has left what the control law holds, while motor and sensors may be sound.
+    pub fn is_fall(self) -> bool {
+        let of_state = matches!(self, Fault::Angle | Fault::Rail | Fault::Speed | Fault::TrackingError);
+        of_state || matches!(self, Fault::Disturbed | Fault::Saturated)
+    }
+
     /// Whether positions can no longer be trusted after this fault, so that homing and sign check are due again.
     pub fn loses_positions(self) -> bool {
         matches!(self, Fault::Encoder | Fault::Frozen | Fault::Watchdog | Fault::Crash)

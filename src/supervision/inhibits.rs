@@ -47,6 +47,7 @@ inhibits! {
     23 ZEROS "the links swing about different zeros every 5 s: let go of them, hold the cart";
     24 NO_TRANSITION "the gain table holds no motion from this equilibrium to that one: plan it with `upright transitions`";
     25 OTHER_ZERO "a link hangs elsewhere than at its absolute sensor's zero: let it hang, or correct `sensor_zero_counts`";
+    26 NO_STILLING "the gain table holds no stilling: hold the links still by hand";
 }
 
 impl Inhibits {
@@ -113,7 +114,7 @@ mod tests {
                 .fold(Inhibits::NONE, |all, (inhibit, _)| all.union(*inhibit))
                 .texts()
                 .count(),
-            26
+            27
         );
         assert_eq!(Inhibits::NONE.err_if_any(), Ok(()));
         assert_eq!(both.err_if_any(), Err(both));

@@ -9,9 +9,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::control::spring_damper::SpringDamper;
 use crate::control::state_feedback::saturate;
 use crate::supervision::fault::Fault;
 use crate::supervision::jog::SILENCE_S;
+use crate::supervision::rates::{Found, Rates};
 use crate::table::{Limits, SensorRow};
 
 /// Number of forces in a command.
@@ -33,14 +35,12 @@ const BACK: f32 = 0.05;
 const SLOW_S: f32 = 0.5;
 /// Largest slew rate of the force, relative to the largest force (1/s).
 const SLEW_PER_S: f32 = 100.0;
-/// Time constant of the filter for the cart's speed (s).
-const FILTER_S: f32 = 0.005;
+/// An encoder is defective if it counts faster than this multiple of the cart's speed limit, or than this rate of a
+/// joint (rad/s).
+const RATE_OF_SPEED: f32 = 4.0;
+const RATE_RAD_PER_S: f32 = 90.0;
 /// Largest angle of a link from where it hung (rad).
 pub const ANGLE_RAD: f32 = 2.1;
-/// Largest rate of a joint (rad/s): an encoder that counts faster is defective.
-pub const RATE_RAD_PER_S: f32 = 90.0;
-/// The same for the cart, as a multiple of its speed limit.
-const RATE_OF_SPEED: f32 = 4.0;
 /// Time within which the force of the jog has to move everything by more than a count: cart, links (s). Other
 /// forces have to do so within the same impulse.
 pub const STILL_S: [f32; 2] = [0.25, 0.5];
@@ -71,9 +71,6 @@ impl Shaking {
     }
 }
 
-/// A fault, and the sensor, if it concerns one.
-type Found = (Fault, Option<u8>);
-
 /// State of the shaking of a rig with `NY` encoders: the cart's, then those of the joints.
 #[derive(Debug, Clone)]
 pub struct Shaker<const NY: usize> {
@@ -81,12 +78,11 @@ pub struct Shaker<const NY: usize> {
     /// Forces of the coming ticks as parts of [`FULL`]; that of tick t is at t modulo [`AHEAD`].
     ring: [i8; AHEAD],
     start: [i32; NY],
-    last: [i32; NY],
+    rates: Rates<NY>,
     /// Where each sensor was last seen to move.
     seen: [i32; NY],
     /// Impulse since then, in units of [`IMPULSE`].
     idle: [u16; NY],
-    speed_m_per_s: f32,
     force_n: f32,
     ticks: u32,
     silent_ticks: u16,
@@ -99,10 +95,9 @@ impl<const NY: usize> Default for Shaker<NY> {
             shaking: Shaking::default(),
             ring: [0; AHEAD],
             start: [0; NY],
-            last: [0; NY],
+            rates: Rates::default(),
             seen: [0; NY],
             idle: [0; NY],
-            speed_m_per_s: 0.0,
             force_n: 0.0,
             ticks: 0,
             silent_ticks: 0,
@@ -114,7 +109,8 @@ impl<const NY: usize> Default for Shaker<NY> {
 impl<const NY: usize> Shaker<NY> {
     /// Begins with everything at rest at these counts.
     pub fn begin(&mut self, shaking: Shaking, counts: &[i32; NY]) {
-        *self = Self { shaking, start: *counts, last: *counts, seen: *counts, ..Self::default() };
+        let rates = Rates::at_rest(counts);
+        *self = Self { shaking, start: *counts, rates, seen: *counts, ..Self::default() };
     }
 
     /// Takes forces from the host, in tick `now`: `first` holds the low 16 bits of the number of the tick that the
@@ -133,7 +129,7 @@ impl<const NY: usize> Shaker<NY> {
 
     /// Speed of the cart (m/s), filtered.
     pub fn speed_m_per_s(&self) -> f32 {
-        self.speed_m_per_s
+        self.rates.speed_m_per_s()
     }
 
     /// Tick `now`, with the sensors at `counts`. Returns the force (N, or
@@ -164,15 +160,15 @@ impl<const NY: usize> Shaker<NY> {
             pushed = 0;
             self.return_ticks = self.return_ticks.saturating_add(1);
             let near = BACK * (limits.rail_m[1] - limits.rail_m[0]);
-            let is_back = f32::abs(position_m) <= near && f32::abs(self.speed_m_per_s) * SLOW_S <= near;
+            let is_back = f32::abs(position_m) <= near && f32::abs(self.speed_m_per_s()) * SLOW_S <= near;
             if is_back || f32::from(self.return_ticks) * tick_s >= RETURN_S {
                 return Ok(None);
             }
         }
         let Shaking { largest_input: most, stiffness, damping } = self.shaking;
-        let wanted = most * f32::from(pushed) / f32::from(FULL)
-            - stiffness * position_m
-            - damping * self.speed_m_per_s;
+        let law = SpringDamper { constants: [stiffness, damping], most_n: [f32::MAX; 2] };
+        let push = most * f32::from(pushed) / f32::from(FULL);
+        let wanted = law.force_n(push, [position_m, self.speed_m_per_s()]);
         let change = saturate(saturate(wanted, most) - self.force_n, SLEW_PER_S * tick_s * most);
         self.force_n = saturate(self.force_n + change, most);
         if self.force_n.is_finite() { Ok(Some(self.force_n)) } else { Err((Fault::NotFinite, None)) }
@@ -186,21 +182,15 @@ impl<const NY: usize> Shaker<NY> {
         limits: &Limits,
         tick_s: f32,
     ) -> Result<f32, Found> {
-        let before = core::mem::replace(&mut self.last, *counts);
+        let fastest = [RATE_OF_SPEED * limits.speed_m_per_s, RATE_RAD_PER_S];
+        self.rates.update(counts, sensors, fastest, tick_s)?;
         let (mut position_m, mut angle) = (0.0, 0.0);
-        let counts = counts.iter().zip(before.iter().zip(&self.start));
-        for (sensor, (row, (&count, (&before, &start)))) in (0..).zip(sensors.iter().zip(counts)) {
-            let step = row.step;
-            let rate = step * count.wrapping_sub(before) as f32 / tick_s;
-            let most = if sensor == 0 { RATE_OF_SPEED * limits.speed_m_per_s } else { RATE_RAD_PER_S };
-            if f32::abs(rate) > most {
-                return Err((Fault::Encoder, Some(sensor)));
-            }
+        let counts = counts.iter().zip(&self.start);
+        for (sensor, (row, (&count, &start))) in sensors.iter().zip(counts).enumerate() {
             if sensor == 0 {
-                position_m = step * count as f32;
-                self.speed_m_per_s += (rate - self.speed_m_per_s) * (tick_s / FILTER_S).min(1.0);
+                position_m = row.step * count as f32;
             } else {
-                angle += step * count.wrapping_sub(start) as f32;
+                angle += row.step * count.wrapping_sub(start) as f32;
                 if f32::abs(angle) > ANGLE_RAD {
                     return Err((Fault::Angle, None));
                 }
@@ -210,7 +200,7 @@ impl<const NY: usize> Shaker<NY> {
         if !(low..=high).contains(&position_m) {
             return Err((Fault::Rail, None));
         }
-        if f32::abs(self.speed_m_per_s) > limits.speed_m_per_s {
+        if f32::abs(self.speed_m_per_s()) > limits.speed_m_per_s {
             return Err((Fault::Speed, None));
         }
         Ok(position_m)

@@ -24,6 +24,11 @@ impl SlowDrive {
         *self = Self { speed_m_per_s: if is_finite { speed_m_per_s } else { 0.0 }, ..Self::default() };
     }
 
+    /// Its speed (m/s).
+    pub fn speed_m_per_s(&self) -> f32 {
+        self.speed_m_per_s
+    }
+
     /// Stops dead, without a ramp.
     pub fn stop(&mut self) {
         *self = Self::default();

@@ -28,12 +28,14 @@ pub enum State {
     Fault,
     /// The motor shakes the hanging links, for an identification.
     Identifying,
+    /// The motor stills links that swing or tumble: after a command, or after a fall.
+    Stilling,
 }
 
 impl State {
     /// Whether the motor is on.
     pub const fn motor_is_on(self) -> bool {
-        self.controls() || matches!(self, State::Jogging | State::Identifying)
+        self.controls() || matches!(self, State::Jogging | State::Identifying | State::Stilling)
     }
 
     /// Whether the controller commands the motor.

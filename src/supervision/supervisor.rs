@@ -17,6 +17,8 @@ pub use crate::supervision::state::State;
 ///                                                             │◄──────── disarm while the motor is on ──────────┘
 ///                                                             ├◄─ disarm ── Jogging ◄─ start_jogging ── Calibrated
 ///                                                             └◄─ disarm ── Identifying ◄─ start_identifying ── Calibrated
+///  Calibrated ─ start_stilling ─► Stilling ─ disarm ─► Calibrated
+/// Raising, Balancing, Holding, Lowering ─ fall ─► Stilling
 /// any state ─ trip ─► Fault ─ clear ─► Calibrated, or Disarmed if positions are not known
 /// ```
 #[derive(Debug, Clone, Default)]
@@ -37,12 +39,18 @@ impl Supervisor {
         self.state
     }
 
-    /// The latched fault; none in any state but [`State::Fault`].
+    /// The latched fault, or the one from which the rig has fallen while its links are stilled; none in other states.
     pub fn fault(&self) -> Option<Fault> {
-        self.cause.filter(|_| self.state == State::Fault).map(|cause| cause.fault)
+        let is_shown = |cause: &Cause| match self.state {
+            State::Fault => true,
+            State::Stilling => cause.fault.is_fall(),
+            _ => false,
+        };
+        self.cause.filter(is_shown).map(|cause| cause.fault)
     }
 
-    /// The first cause of the latched fault, or of the reset before the start; none once it is cleared.
+    /// The first cause of the latched fault, of the last fall, or of the reset before the start; none once it is
+    /// cleared.
     pub fn cause(&self) -> Option<Cause> {
         self.cause
     }
@@ -57,6 +65,15 @@ impl Supervisor {
         self.positions_known &= !cause.fault.loses_positions() && self.state != State::Homing;
         self.cause = Some(cause);
         self.state = State::Fault;
+    }
+
+    /// The rig has fallen: its links are stilled instead of the motor going off. `cause` stays known afterwards.
+    #[inline(never)]
+    pub fn fall(&mut self, cause: Cause) {
+        if self.state.controls() {
+            self.cause = Some(cause);
+            self.state = State::Stilling;
+        }
     }
 
     /// Positions are not known any more.
@@ -76,7 +93,7 @@ impl Supervisor {
             | State::Balancing
             | State::Holding
             | State::Lowering => self.state = State::Calibrated,
-            State::Identifying => self.state = State::Calibrated,
+            State::Identifying | State::Stilling => self.state = State::Calibrated,
             State::Homing => self.state = State::Disarmed,
             State::Disarmed | State::Calibrated | State::Fault => {}
         }
@@ -117,7 +134,7 @@ impl Supervisor {
             | State::Balancing
             | State::Holding
             | State::Lowering => Err(Inhibits::RUNNING),
-            State::Identifying => Err(Inhibits::RUNNING),
+            State::Identifying | State::Stilling => Err(Inhibits::RUNNING),
             State::Fault => Err(Inhibits::FAULT),
         }
     }
@@ -138,7 +155,7 @@ impl Supervisor {
         unknown.union(match self.state {
             State::Disarmed | State::Homing | State::Calibrated => Inhibits::NONE,
             State::Jogging | State::Identifying | State::Armed | State::Raising => Inhibits::RUNNING,
-            State::Balancing | State::Holding | State::Lowering => Inhibits::RUNNING,
+            State::Balancing | State::Holding | State::Lowering | State::Stilling => Inhibits::RUNNING,
             State::Fault => Inhibits::FAULT,
         })
     }
@@ -160,6 +177,18 @@ impl Supervisor {
     pub fn start_identifying(&mut self, other: Inhibits) -> Result<(), Inhibits> {
         self.arming_inhibits().union(other).err_if_any()?;
         self.state = State::Identifying;
+        Ok(())
+    }
+
+    /// Turns the motor on to still the links, unless the state or one of `other` inhibits it. An earlier fall is no
+    /// longer their cause.
+    ///
+    /// # Errors
+    /// All inhibits that hold.
+    pub fn start_stilling(&mut self, other: Inhibits) -> Result<(), Inhibits> {
+        self.arming_inhibits().union(other).err_if_any()?;
+        self.cause = self.cause.filter(|cause| !cause.fault.is_fall());
+        self.state = State::Stilling;
         Ok(())
     }
 
@@ -240,7 +269,7 @@ mod tests {
     use State::*;
     use std::vec::Vec;
 
-    const STATES: [State; 11] = [
+    const STATES: [State; 12] = [
         Disarmed,
         Homing,
         Calibrated,
@@ -251,6 +280,7 @@ mod tests {
         Balancing,
         Holding,
         Lowering,
+        Stilling,
         Fault,
     ];
 
@@ -258,6 +288,7 @@ mod tests {
     enum Event {
         Trip,
         TripEncoder,
+        Fall,
         Disarm,
         StartHoming,
         CompleteHoming,
@@ -265,6 +296,8 @@ mod tests {
         StartJoggingInhibited,
         StartIdentifying,
         StartIdentifyingInhibited,
+        StartStilling,
+        StartStillingInhibited,
         Arm,
         ArmInhibited,
         StartBalancing,
@@ -295,6 +328,7 @@ mod tests {
         match event {
             Event::Trip => supervisor.trip(cause(super::Fault::Rail)),
             Event::TripEncoder => supervisor.trip(cause(super::Fault::Encoder)),
+            Event::Fall => supervisor.fall(cause(super::Fault::Angle)),
             Event::Disarm => supervisor.disarm(),
             Event::StartHoming => return supervisor.start_homing(),
             Event::CompleteHoming => return supervisor.complete_homing(),
@@ -302,6 +336,8 @@ mod tests {
             Event::StartJoggingInhibited => return supervisor.start_jogging(Inhibits::MOVING),
             Event::StartIdentifying => return supervisor.start_identifying(Inhibits::NONE),
             Event::StartIdentifyingInhibited => return supervisor.start_identifying(Inhibits::MOTOR),
+            Event::StartStilling => return supervisor.start_stilling(Inhibits::NONE),
+            Event::StartStillingInhibited => return supervisor.start_stilling(Inhibits::NO_STILLING),
             Event::Arm => return supervisor.arm(Inhibits::NONE),
             Event::ArmInhibited => return supervisor.arm(Inhibits::TILTED),
             Event::StartBalancing => supervisor.start_balancing(),
@@ -320,22 +356,39 @@ mod tests {
         Ok(())
     }
 
-    const RUNNING: [State; 8] = [Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
-    const NOT_CALIBRATED: [State; 10] =
-        [Disarmed, Homing, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Fault];
-    const NOT_BALANCING: [State; 9] =
-        [Disarmed, Homing, Calibrated, Jogging, Identifying, Armed, Raising, Lowering, Fault];
+    const RUNNING: [State; 9] =
+        [Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Stilling, Fault];
+    const NOT_CALIBRATED: [State; 11] = [
+        Disarmed,
+        Homing,
+        Jogging,
+        Identifying,
+        Armed,
+        Raising,
+        Balancing,
+        Holding,
+        Lowering,
+        Stilling,
+        Fault,
+    ];
+    const NOT_BALANCING: [State; 10] =
+        [Disarmed, Homing, Calibrated, Jogging, Identifying, Armed, Raising, Lowering, Stilling, Fault];
 
     /// One row per event: the state it leads to from each of STATES, and where it is refused.
-    fn transitions() -> [(Event, [State; 11], &'static [State]); 23] {
+    fn transitions() -> [(Event, [State; 12], &'static [State]); 26] {
         use Event::*;
         // Where an event leads to from each of STATES, if not to the same state.
         let but = |changes: &[(State, State)]| {
             STATES.map(|from| changes.iter().find(|(state, _)| *state == from).map_or(from, |(_, to)| *to))
         };
         [
-            (Trip, [Fault; 11], &[]),
-            (TripEncoder, [Fault; 11], &[]),
+            (Trip, [Fault; 12], &[]),
+            (TripEncoder, [Fault; 12], &[]),
+            (
+                Fall,
+                but(&[(Raising, Stilling), (Balancing, Stilling), (Holding, Stilling), (Lowering, Stilling)]),
+                &[],
+            ),
             (
                 Disarm,
                 but(&[
@@ -347,6 +400,7 @@ mod tests {
                     (Balancing, Calibrated),
                     (Holding, Calibrated),
                     (Lowering, Calibrated),
+                    (Stilling, Calibrated),
                 ]),
                 &[],
             ),
@@ -356,6 +410,8 @@ mod tests {
             (StartJoggingInhibited, STATES, &STATES),
             (StartIdentifying, but(&[(Calibrated, Identifying)]), &NOT_CALIBRATED),
             (StartIdentifyingInhibited, STATES, &STATES),
+            (StartStilling, but(&[(Calibrated, Stilling)]), &NOT_CALIBRATED),
+            (StartStillingInhibited, STATES, &STATES),
             (Arm, but(&[(Calibrated, Armed)]), &NOT_CALIBRATED),
             (ArmInhibited, STATES, &STATES),
             (StartBalancing, but(&[(Armed, Balancing)]), &[]),
@@ -375,7 +431,8 @@ mod tests {
 
     #[test]
     fn every_event_in_every_state_leads_where_the_table_says() {
-        let known = [Calibrated, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering];
+        let known =
+            [Calibrated, Jogging, Identifying, Armed, Raising, Balancing, Holding, Lowering, Stilling];
         for (event, leads_to, refused_in) in transitions() {
             for (from, to) in STATES.into_iter().zip(leads_to) {
                 let mut supervisor = supervisor(from, known.contains(&from));
@@ -400,6 +457,23 @@ mod tests {
         assert_eq!(supervisor.fault(), Some(super::Fault::Angle));
         supervisor.clear(Inhibits::NONE).unwrap();
         assert_eq!((supervisor.state(), supervisor.cause()), (Calibrated, None));
+    }
+
+    #[test]
+    fn a_fall_is_told_while_the_links_are_stilled_and_known_until_they_are_stilled_again() {
+        let mut supervisor = supervisor(Balancing, true);
+        supervisor.fall(cause(super::Fault::Angle));
+        assert_eq!((supervisor.state(), supervisor.fault()), (Stilling, Some(super::Fault::Angle)));
+        supervisor.disarm();
+        assert_eq!((supervisor.state(), supervisor.fault()), (Calibrated, None));
+        assert!(supervisor.cause().is_some());
+        supervisor.start_stilling(Inhibits::NONE).unwrap();
+        assert_eq!((supervisor.fault(), supervisor.cause()), (None, None));
+        // What turns the motor off counts, not the fall before.
+        supervisor.fall(cause(super::Fault::Rail));
+        assert_eq!(supervisor.fault(), None, "it does not fall while it is stilled");
+        supervisor.trip(cause(super::Fault::Driver));
+        assert_eq!((supervisor.state(), supervisor.fault()), (Fault, Some(super::Fault::Driver)));
     }
 
     #[test]

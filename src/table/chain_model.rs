@@ -9,6 +9,7 @@ part! {
     /// [`plant`](crate::plant). The units are those of a cart: on an arm, the base moves by an angle, so that rad takes
     /// the place of m, N m that of N, and kg m² that of kg. Where the drive imposes the base's acceleration, that is
     /// the input instead of the force: M_t is 1, `reaction` and d_0 are 0, and `b_reduced` is `b`.
+    #[derive(Copy)]
     pub struct ChainModel<N to M; T> {
         /// 1 / M_t, M_t the mass of cart and links together (1/kg).
         pub inverse_mass: T,

@@ -12,6 +12,7 @@ use crate::table::limits::Limits;
 use crate::table::observer::ObserverGains;
 use crate::table::part::{is_finite, part};
 use crate::table::sensor::SensorRow;
+use crate::table::stilling::StillingGains;
 use crate::table::thresholds::Thresholds;
 
 part! {
@@ -43,6 +44,8 @@ part! {
         pub limits: Limits,
         /// Thresholds at which the supervisor takes encoders and motor to be at fault.
         pub thresholds: Thresholds<NY>,
+        /// How the motor stills the links; none for a `[model]`, and where no sensor measures that they hang.
+        pub stilling: Option<StillingGains<NY>>,
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above, see [`GainTable::checksum`].
         pub crc,
@@ -117,6 +120,7 @@ impl<const NX: usize, const NY: usize> GainTable<NX, NY> {
             && self.laws.present().all(|(_, law)| law.is_sound())
             && self.limits.is_sound()
             && self.thresholds.is_sound()
+            && self.stilling.iter().all(StillingGains::is_sound)
             && self.sensors.iter().all(SensorRow::is_sound);
         if is_sound && is_finite(self) { Ok(()) } else { Err(TableError::Value) }
     }

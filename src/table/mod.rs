@@ -33,6 +33,7 @@ mod observer;
 mod part;
 mod sensor;
 mod steps;
+mod stilling;
 mod swing_up;
 mod thresholds;
 
@@ -56,6 +57,7 @@ pub(crate) use part::WordsMut;
 pub use part::{Part, Reader, Resize, Shape, Variant, Words};
 pub use sensor::{ReadingMap, SensorKind, SensorRow};
 pub use steps::StepMap;
+pub use stilling::{ImitatedBase, StillingGains};
 pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
 pub use thresholds::{MotorTest, Thresholds};
 

@@ -48,6 +48,21 @@ fn sensors(next: &mut impl FnMut() -> f32) -> [SensorRow; 2] {
     core::array::from_fn(row)
 }
 
+/// A model of two links.
+fn model(next: &mut impl FnMut() -> f32) -> ChainModel<2> {
+    ChainModel {
+        inverse_mass: next(),
+        a: SVector::from_fn(|_, _| next()),
+        weight: SVector::from_fn(|_, _| next()),
+        b: SMatrix::from_fn(|_, _| next()),
+        b_reduced: SMatrix::from_fn(|_, _| next()),
+        reaction: SVector::from_fn(|_, _| next()),
+        cart_friction: next(),
+        joint_frictions: SVector::from_fn(|_, _| next()),
+        turning: Some(Turning { beta: SMatrix::from_fn(|_, _| next()), reaction: next() }),
+    }
+}
+
 /// A table with every optional part, all numbers different.
 fn full() -> GainTable<4, 2> {
     let mut number = 0.5;
@@ -91,6 +106,17 @@ fn full() -> GainTable<4, 2> {
         }),
         limits: LIMITS,
         thresholds: THRESHOLDS,
+        stilling: Some(StillingGains {
+            after_fall_ticks: 2000,
+            stiffness: next(),
+            damping: next(),
+            most_n: [next(), next()],
+            friction_n: next(),
+            imitated: Some(ImitatedBase { taken: [next(), next()], model: model(&mut next) }),
+            braking_m_per_s2: next(),
+            speed_m_per_s: next(),
+            rail_m: [-1.25, 1.25],
+        }),
         crc: 0,
     };
     table.crc = table.checksum();
@@ -288,7 +314,7 @@ fn a_reader_hears_every_name_in_the_order_of_declaration() {
         assert!(found.is_some(), "{name}");
         rest = &rest[found.unwrap() + name.len()..];
     }
-    assert_eq!(names.0.last().map(String::as_str), Some("energy"));
+    assert_eq!(names.0.last().map(String::as_str), Some("rail_m"));
 }
 
 /// Columns of a motion for four states and two sensors, with four knots: reference, force and gains; and the filter.

@@ -33,6 +33,7 @@ mod potentiometer;
 mod reality_loop;
 mod rig_fuzz;
 mod set_points;
+mod stilling;
 mod supervised;
 mod supervisor_false_alarms;
 mod supervisor_faults;

@@ -84,6 +84,7 @@ fn table<const NX: usize, const NY: usize>(
         }),
         limits: Limits::none(),
         thresholds: Thresholds::none(),
+        stilling: None,
         crc: 0,
     };
     table.crc = table.checksum();

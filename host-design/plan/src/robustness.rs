@@ -91,7 +91,7 @@ pub(crate) fn score(
 }
 
 /// Scales the mass of a body; body 0 is the cart. An inertia given in the file is scaled with the mass.
-fn scale_mass(chain: &mut Chain, body: usize, factor: f64) {
+pub(crate) fn scale_mass(chain: &mut Chain, body: usize, factor: f64) {
     match body.checked_sub(1) {
         None => chain.cart.mass_kg = chain.cart.mass_kg.map(|mass| factor * mass),
         Some(link) => {
@@ -101,7 +101,7 @@ fn scale_mass(chain: &mut Chain, body: usize, factor: f64) {
     }
 }
 
-fn scale_friction(chain: &mut Chain, factor: f64) {
+pub(crate) fn scale_friction(chain: &mut Chain, factor: f64) {
     chain.cart.friction_n_s_per_m *= factor;
     for link in &mut chain.links {
         link.friction_n_m_s_per_rad *= factor;

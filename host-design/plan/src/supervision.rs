@@ -25,9 +25,6 @@ const LEAST_DEVIATION_M: f64 = 0.02;
 const LEAST_DEVIATION_ON_STEPPER_M: f64 = 0.03;
 /// Factor on the largest speed of the cart that the machines reach.
 const SPEED_MARGIN: f64 = 1.2;
-/// Share of the distance from a soft limit to the end of the rail that stays free while the rig moves: a plan turns
-/// within the soft limits, but the rig may start away from its set-point.
-const FREE_SHARE: f64 = 0.25;
 
 /// Sets the limits and thresholds with which the firmware supervises the motions of `table`. They come from runs of
 /// machines with the rig's noise and with errors of masses, friction, start and encoder zeros within the spreads of
@@ -40,16 +37,12 @@ pub(crate) fn set_limits(rig: &Rig, table: &mut TableValues) -> Result<(), Simul
     let reached = healthy(rig, table)?;
     let (usual, balancing) = (table.limits, table.thresholds);
     let Some(swing_up) = &mut table.swing_up else { return Ok(()) };
-    let end = |side: usize| {
-        let end = chain.cart.travel_m[side];
-        (end - FREE_SHARE * (end - f64::from(usual.rail_m[side]))) as f32
-    };
     let least_m = if chain.input.is_force() { LEAST_DEVIATION_M } else { LEAST_DEVIATION_ON_STEPPER_M };
     swing_up.limits = MotionLimits {
         deviation_rad: (MARGIN * reached.deviation_rad).max(LOST_RAD) as f32,
         deviation_m: (MARGIN * reached.deviation_m).max(least_m) as f32,
         speed_m_per_s: usual.speed_m_per_s.max((SPEED_MARGIN * reached.speed_m_per_s) as f32),
-        rail_m: [end(0), end(1)],
+        rail_m: chain.rail_in_motion_m(usual.rail_m),
     };
     swing_up.thresholds = balancing;
     let thresholds = &mut swing_up.thresholds;

@@ -32,6 +32,7 @@ fn table() -> GainTable<2, 1> {
         friction: None,
         limits: Limits::none(),
         thresholds: Thresholds::none(),
+        stilling: None,
         crc: 0,
     };
     table.crc = table.checksum();

@@ -25,7 +25,7 @@ pub enum MonitorAction {
 /// A line that is not a command.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no command; give home, home-rail, check-signs, jog +x|-x, arm, up, down, goto LINKS (as ud), disarm, clear, set-point METRES, or law lqr|pole-placement"
+    "`{0}` is no command; give home, home-rail, check-signs, jog +x|-x, arm, up, down, goto LINKS (as ud), still, disarm, clear, set-point METRES, or law lqr|pole-placement"
 )]
 pub struct BadCommand(String);
 
@@ -46,6 +46,7 @@ pub fn request(line: &str) -> Result<Request, BadCommand> {
         ["up"] => Request::Goto(Equilibrium::UPRIGHT),
         ["down"] => Request::Goto(Equilibrium::HANGING),
         ["goto", links] => Request::Goto(equilibrium_named(links, links.len()).ok_or_else(bad)?),
+        ["still"] => Request::Still,
         ["disarm"] => Request::Disarm,
         ["clear"] => Request::Clear,
         ["set-point", metres] => Request::Setpoint(metres.parse().map_err(|_| bad())?),

@@ -327,6 +327,7 @@ fn name(request: Request, links: usize) -> String {
         Request::Goto(Equilibrium::UPRIGHT) => "up".to_owned(),
         Request::Goto(Equilibrium::HANGING) => "down".to_owned(),
         Request::Goto(to) => format!("go to {}", posture_name(to, links)),
+        Request::Still => "still".to_owned(),
         Request::Disarm => "disarm".to_owned(),
         Request::Clear => "clear".to_owned(),
         Request::Setpoint(metres) => format!("set-point {metres:.3} m"),

@@ -21,6 +21,7 @@ pub fn state(state: State) -> &'static str {
         State::Balancing => "balancing: the motor is on",
         State::Holding => "holding where some links hang: the motor is on",
         State::Lowering => "lowering: the motor is on",
+        State::Stilling => "stilling: the motor brings the links to rest",
         State::Fault => "fault: motor off",
     }
 }

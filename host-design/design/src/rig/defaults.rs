@@ -10,5 +10,7 @@ pub const RAIL_MARGIN_SHARE: f64 = 0.025;
 pub const TRAVEL_TOLERANCE_SHARE: f64 = 0.01;
 /// Largest force of the jog, as a share of the force limit.
 pub const JOG_FORCE_SHARE: f64 = 0.1;
+/// Longest time for which the links are stilled after a fall (s).
+pub const STILLING_S: f64 = 0.0;
 /// Lowest supply voltage, as a share of the motor's supply voltage.
 pub const SUPPLY_SHARE: f64 = 0.8;

@@ -24,6 +24,11 @@ impl Rule {
     /// Zero or above.
     pub(super) const NOT_NEGATIVE: Rule =
         Rule { accepts: "a number >= 0", admits: |x| x.iter().all(|&x| x >= 0.0) };
+    /// A time, or none (s).
+    pub(super) const AT_MOST_A_MINUTE: Rule = Rule {
+        accepts: "a number from 0 to 60 (s)",
+        admits: |x| x.iter().all(|&x| (0.0..=60.0).contains(&x)),
+    };
     /// Below zero.
     pub(super) const NEGATIVE: Rule =
         Rule { accepts: "a number < 0", admits: |x| x.iter().all(|&x| x < 0.0) };

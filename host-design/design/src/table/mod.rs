@@ -17,6 +17,7 @@ mod contents;
 mod error;
 mod friction;
 mod source;
+mod stilling;
 mod supervision;
 mod swing_up;
 mod values;

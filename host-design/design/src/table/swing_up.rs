@@ -229,7 +229,7 @@ fn in_units(rows: &[f64], width: usize) -> Result<(Vec<f32>, Vec<i16>), NoTable>
 }
 
 /// The model, each constant rounded once to `f32`.
-fn narrow<const N: usize>(model: &ChainModel<N, f64>) -> ChainModel<N> {
+pub(super) fn narrow<const N: usize>(model: &ChainModel<N, f64>) -> ChainModel<N> {
     let vector = |of: &SVector<f64, N>| SVector::from_fn(|j, _| of[j] as f32);
     let matrix = |of: &SMatrix<f64, N, N>| SMatrix::from_fn(|j, k| of[(j, k)] as f32);
     ChainModel {

@@ -12,7 +12,7 @@ use upright::table::{
 use super::any_size::{MAX_STATES, WidestTable, WithSize, widest, with_size};
 use super::error::{NoTable, finite};
 use super::swing_up::SwingUpValues;
-use super::{contents, friction, supervision};
+use super::{contents, friction, stilling, supervision};
 use crate::design::{Certified, Design, Feedback, Uncertified, detection_thresholds, setpoint_step, shares};
 use crate::rig::{AccelerationDrive, Actuator, Motor, PlantDescription, Rig};
 
@@ -95,6 +95,7 @@ impl TableValues {
         let rounded = single.kalman.as_ref().map_or(&[][..], |kalman| kalman.steps.entries());
         let detection = detection_thresholds(rig, double);
         let friction = friction::friction_map(rig, double)?;
+        let limits = supervision::limits(rig, steps)?;
         let widest = GainTable {
             format: TABLE_FORMAT,
             dimensions: [states as u32, sensors as u32],
@@ -110,8 +111,9 @@ impl TableValues {
                 l: widest(&kalman.l_filter),
             }),
             friction,
-            limits: supervision::limits(rig, steps)?,
+            limits,
             thresholds: supervision::thresholds(detection.as_ref()),
+            stilling: stilling::gains(rig, limits.rail_m)?,
             crc: 0,
         };
         let values = Self { rig: rig.name.clone(), swing_up: None, widest };

@@ -32,6 +32,7 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         State::Balancing,
         State::Holding,
         State::Lowering,
+        State::Stilling,
         State::Fault,
     ];
     let defects = Defect::ALL.iter().filter(|defect| defects.is_some_and(|defects| defects.contains(defect)));
@@ -40,6 +41,7 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "place": place,
         "is_simulated": is_simulated,
         "has_swing_up": table.swing_up.is_some(),
+        "has_stilling": table.stilling.is_some(),
         "tick_s": rig.tick.period_s,
         "falls_when_held": lengths.len() > FEW_LINKS,
         "lengths_m": lengths,

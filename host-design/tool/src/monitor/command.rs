@@ -22,6 +22,7 @@ pub fn action(key: &KeyEvent) -> Option<MonitorAction> {
         KeyCode::Char('a') => MonitorAction::Send(Request::Arm),
         KeyCode::Char('u') => MonitorAction::Send(Request::Goto(Equilibrium::UPRIGHT)),
         KeyCode::Char('n') => MonitorAction::Send(Request::Goto(Equilibrium::HANGING)),
+        KeyCode::Char('s') => MonitorAction::Send(Request::Still),
         KeyCode::Char('d' | ' ') => MonitorAction::Send(Request::Disarm),
         KeyCode::Char('c') => MonitorAction::Send(Request::Clear),
         KeyCode::Char('0') => MonitorAction::Send(Request::Setpoint(0.0)),

@@ -61,7 +61,9 @@ fn colour(state: State) -> Color {
     match state {
         State::Disarmed | State::Calibrated => Color::White,
         State::Homing | State::Armed => Color::Yellow,
-        State::Jogging | State::Identifying | State::Raising | State::Lowering => Color::Magenta,
+        State::Jogging | State::Identifying | State::Raising | State::Lowering | State::Stilling => {
+            Color::Magenta
+        }
         State::Balancing | State::Holding => Color::Green,
         State::Fault => Color::Red,
     }

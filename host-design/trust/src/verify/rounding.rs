@@ -171,6 +171,7 @@ fn in_double_precision(exact: &Numbers<f64>, table: &TableValues, law: Law) -> D
         }),
         limits: Limits::none(),
         thresholds: Thresholds::none(),
+        stilling: None,
         crc: 0,
     }
 }

@@ -73,6 +73,22 @@ pub enum PlantDescription {
     Model(LinearPlant),
 }
 
+/// Share of the distance from a soft limit to the end of the rail that stays free while the rig moves: a plan turns
+/// within the soft limits, but the rig may start away from its set-point.
+const FREE_SHARE: f64 = 0.25;
+
+impl Chain {
+    /// Lowest and highest position of the cart while its links are raised, lowered or stilled, with these soft limits
+    /// of the rail (m).
+    pub fn rail_in_motion_m(&self, soft_m: [f32; 2]) -> [f32; 2] {
+        let end = |side: usize| {
+            let end = self.cart.travel_m[side];
+            (end - FREE_SHARE * (end - f64::from(soft_m[side]))) as f32
+        };
+        [end(0), end(1)]
+    }
+}
+
 /// What the drive imposes on the cart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub enum CartInput {

@@ -56,6 +56,11 @@ keys! {
             "time for which all links have to be upright and slow before balancing begins", Absent::Numbers(&[0.3]);
         still_time_s: f64, "s", Rule::DURATION,
             "time for which links and cart have to be still before they are homed", Absent::Numbers(&[0.5]);
+        // Skipped if absent, as above.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        stilling_s: Option<f64>, "s", Rule::AT_MOST_A_MINUTE,
+            "longest time for which the motor stills the links after a fall; 0: it goes off instead",
+            Absent::Follows("0");
         false_alarm_h: f64, "h", Rule::FALSE_ALARM,
             "mean time between false alarms of the encoder and motor tests while balancing",
             Absent::Numbers(&[1000.0]);

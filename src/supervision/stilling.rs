@@ -1,0 +1,227 @@
+//! Stilling: the motor brings links that tumble or swing to rest hanging, from any motion.
+//!
+//! The motor imitates a spring and a damper on the base, each with a largest force. Whatever the masses of the rig,
+//! they only take energy from it, and the base goes no further than the energy bends the spring. Where the table says
+//! so, the motor also imitates a base of less mass and friction, on which the links swing out sooner. With `M` and `D`
+//! its mass and viscous friction, `m` and `d` those of the real one and `F` the force of spring and damper:
+//!
+//! ```text
+//! ẍ = the acceleration of the imitated base with these links under F
+//! u = F + (m - M) ẍ + (d - D) ẋ + dry friction,   or u = ẍ for a drive that imposes the acceleration
+//! ```
+//!
+//! An outward bound base that would otherwise pass the soft end of the rail is braked with the largest force.
+
+use crate::control::spring_damper::SpringDamper;
+use crate::control::state_feedback::saturate;
+use crate::plant::ChainState;
+use crate::supervision::fault::Fault;
+use crate::supervision::rates::{Found, Rates};
+use crate::table::{GainTable, StillingGains};
+
+/// After a command, the motor goes off after this time, whether the links hang still or not (s).
+pub const LONGEST_S: f32 = 20.0;
+/// The base's encoder is defective if it counts faster than this multiple of the largest speed of stilling. Short outer
+/// links of a chain that tumbles whip round faster than anything that an encoder could be told by.
+const RATE_OF_SPEED: f32 = 2.0;
+/// A slower base may stick: dry friction is made up for along the wanted force (m/s).
+const STICKS_M_PER_S: f32 = 0.02;
+/// That force, times this, is what is made up for, at most all of the known friction.
+const STUCK_GAIN: f32 = 5.0;
+
+/// State of the stilling of a rig with `NY` sensors.
+#[derive(Debug, Clone)]
+pub struct Stiller<const NY: usize> {
+    rates: Rates<NY>,
+    ticks_left: u32,
+}
+
+impl<const NY: usize> Default for Stiller<NY> {
+    fn default() -> Self {
+        Self { rates: Rates::default(), ticks_left: 0 }
+    }
+}
+
+impl<const NY: usize> Stiller<NY> {
+    /// Begins with the sensors at these counts, for at most so many ticks. The rates are known after some milliseconds.
+    pub fn begin(&mut self, counts: &[i32; NY], longest_ticks: u32) {
+        *self = Self { rates: Rates::at_rest(counts), ticks_left: longest_ticks };
+    }
+
+    /// Speed of the base (m/s), filtered.
+    pub fn speed_m_per_s(&self) -> f32 {
+        self.rates.speed_m_per_s()
+    }
+
+    /// Whether the time is over.
+    pub fn is_over(&self) -> bool {
+        self.ticks_left == 0
+    }
+
+    /// A tick with the sensors at `counts`. Returns the input of the plant: a force (N), or an acceleration (m/s²). A
+    /// drive with pulses knows its speed (`driven_m_per_s`).
+    ///
+    /// # Errors
+    /// The fault, and the sensor, if it concerns one.
+    pub fn update<const NX: usize>(
+        &mut self,
+        counts: &[i32; NY],
+        table: &GainTable<NX, NY>,
+        gains: &StillingGains<NY>,
+        driven_m_per_s: Option<f32>,
+    ) -> Result<f32, Found> {
+        self.ticks_left = self.ticks_left.saturating_sub(1);
+        let fastest = [RATE_OF_SPEED * gains.speed_m_per_s, f32::MAX];
+        self.rates.update(counts, &table.sensors, fastest, table.tick_s)?;
+        let mut state = self.state(counts, table);
+        state.xdot = driven_m_per_s.unwrap_or(state.xdot);
+        let [low, high] = gains.rail_m;
+        if (state.x < low && state.xdot < 0.0) || (state.x > high && state.xdot > 0.0) {
+            return Err((Fault::Rail, None));
+        }
+        if f32::abs(state.xdot) > gains.speed_m_per_s {
+            return Err((Fault::Speed, None));
+        }
+        let most = table.drive.largest_input();
+        if gains.has_to_brake(&state, table.limits.rail_m) {
+            return Ok(f32::copysign(most, -state.xdot));
+        }
+        let input = gains.input(&state, table.drive.pulses().is_some());
+        if input.is_finite() { Ok(input) } else { Err((Fault::NotFinite, None)) }
+    }
+
+    /// The state at these counts, with the angles of the links from the vertical up to whole turns.
+    fn state<const NX: usize>(&self, counts: &[i32; NY], table: &GainTable<NX, NY>) -> ChainState<NY> {
+        let mut state = ChainState::upright();
+        let (mut angle, mut rate) = (0.0, 0.0);
+        let links = state.phi.iter_mut().zip(&mut state.phidot);
+        let joints = counts.iter().zip(&table.sensors).zip(self.rates.all());
+        for (((&count, sensor), joint_rate), (phi, phidot)) in joints.skip(1).zip(links) {
+            angle += sensor.step * sensor.within_half_a_turn(count) as f32;
+            rate += joint_rate;
+            (*phi, *phidot) = (angle, rate);
+        }
+        let cart = counts.iter().zip(&table.sensors).next();
+        state.x = cart.map_or(0.0, |(&count, sensor)| sensor.step * count as f32);
+        state.xdot = self.speed_m_per_s();
+        state
+    }
+}
+
+impl<const NY: usize> StillingGains<NY> {
+    /// Whether a base that is outward bound has to be braked with all force to turn before the soft end of the rail.
+    fn has_to_brake(&self, state: &ChainState<NY>, [low, high]: [f32; 2]) -> bool {
+        let left = if state.xdot > 0.0 { high - state.x } else { state.x - low };
+        let from_middle = state.x - 0.5 * (low + high);
+        from_middle * state.xdot > 0.0 && state.xdot * state.xdot > 2.0 * self.braking_m_per_s2 * left
+    }
+
+    /// The force (N) in this state, or the acceleration (m/s²) if the drive imposes that.
+    fn input(&self, state: &ChainState<NY>, is_acceleration: bool) -> f32 {
+        let law = SpringDamper { constants: [self.stiffness, self.damping], most_n: self.most_n };
+        let mut wanted = law.force_n(0.0, [state.x, state.xdot]);
+        if let Some(base) = &self.imitated {
+            let acceleration = base.model.derivative(state, wanted, &[0.0; NY]).xdot;
+            if is_acceleration {
+                return acceleration;
+            }
+            let [mass, friction] = base.taken;
+            wanted += mass * acceleration + friction * state.xdot;
+        }
+        let stuck = saturate(STUCK_GAIN * wanted, self.friction_n);
+        let moves = f32::abs(state.xdot) > STICKS_M_PER_S;
+        wanted + if moves { f32::copysign(self.friction_n, state.xdot) } else { stuck }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gains::{SENSORS, TABLE};
+
+    /// Input in the first tick at these counts of the cart, in the second one of which it has moved by `moved`.
+    fn input(cart: i32, moved: i32, gains: &StillingGains<SENSORS>) -> Result<f32, Found> {
+        let mut counts = TABLE.sensors.map(|sensor| sensor.rest_counts);
+        counts[0] = cart;
+        let mut stiller = Stiller::default();
+        stiller.begin(&counts, 10);
+        // Long enough for the filter.
+        let mut last = Ok(0.0);
+        for _ in 0..40 {
+            counts[0] += moved;
+            last = stiller.update(&counts, &TABLE, gains, None);
+        }
+        last
+    }
+
+    fn counts(position_m: f32) -> i32 {
+        (position_m / TABLE.sensors[0].step) as i32
+    }
+
+    #[test]
+    fn spring_and_damper_pull_the_base_back_and_no_force_is_larger_than_theirs() {
+        let gains = StillingGains { imitated: None, ..TABLE.stilling.unwrap() };
+        let [spring_n, damper_n] = gains.most_n;
+        let at_rest = input(counts(0.1), 0, &gains).unwrap();
+        assert!((at_rest + 0.1 * gains.stiffness).abs() < 1e-3, "{at_rest}");
+        assert_eq!(input(counts(1.7), 0, &gains), Ok(-spring_n));
+        // 3 m/s to the middle, from 1.2 m.
+        let inward = input(counts(-1.2), 150, &gains).unwrap();
+        assert!((inward - (spring_n - damper_n)).abs() < 0.01, "{inward}");
+    }
+
+    #[test]
+    fn links_that_hang_at_rest_add_nothing_to_the_force_of_a_lighter_base() {
+        let gains = TABLE.stilling.unwrap();
+        let base = gains.imitated.unwrap();
+        // The base starts with the acceleration of a mass with links of which only their first moment resists.
+        let (spring, pulled) = (-0.1 * gains.stiffness, input(counts(0.1), 0, &gains).unwrap());
+        assert!(pulled < spring && pulled > spring * (1.0 + base.taken[0] / 0.018), "{pulled} {spring}");
+    }
+
+    #[test]
+    fn a_base_that_would_pass_the_soft_end_is_braked_with_all_force() {
+        let gains = TABLE.stilling.unwrap();
+        let high = TABLE.limits.rail_m[1];
+        let (step_m, speed) = (TABLE.sensors[0].step, 3.0);
+        let moved = (speed * TABLE.tick_s / step_m) as i32;
+        let way_m = speed * speed / (2.0 * gains.braking_m_per_s2);
+        let start = |before_m: f32| counts(high - way_m - before_m) - 40 * moved;
+        assert_eq!(input(start(-0.02), moved, &gains), Ok(-20.0));
+        assert!(input(start(0.05), moved, &gains).unwrap() > -20.0);
+        // It is not braked on its way back.
+        let inward =
+            input(-start(-0.02) - 80 * moved, moved, &StillingGains { imitated: None, ..gains }).unwrap();
+        assert!(inward > 0.0 && inward < 20.0, "{inward}");
+    }
+
+    #[test]
+    fn stilling_ends_at_its_own_limits() {
+        let gains = TABLE.stilling.unwrap();
+        let end = counts(gains.rail_m[1]) + 10;
+        assert_eq!(input(end, 2, &gains), Err((Fault::Rail, None)));
+        // Beyond the limit, but on the way back.
+        assert!(input(end + 200, -2, &gains).is_ok());
+        let slow = StillingGains { speed_m_per_s: 2.0, ..gains };
+        assert_eq!(input(-4000, 150, &slow), Err((Fault::Speed, None)));
+        assert_eq!(input(0, 250, &slow), Err((Fault::Encoder, Some(0))));
+        let mut stiller = Stiller::default();
+        stiller.begin(&TABLE.sensors.map(|sensor| sensor.rest_counts), 1);
+        assert!(!stiller.is_over());
+        let _ = stiller.update(&TABLE.sensors.map(|sensor| sensor.rest_counts), &TABLE, &gains, None);
+        assert!(stiller.is_over());
+    }
+
+    #[test]
+    fn dry_friction_is_made_up_for_along_the_motion_and_at_rest_along_the_wanted_force() {
+        let gains = StillingGains { imitated: None, friction_n: 0.5, ..TABLE.stilling.unwrap() };
+        let without = StillingGains { friction_n: 0.0, ..gains };
+        let added = |cart: i32, moved: i32| {
+            input(cart, moved, &gains).unwrap() - input(cart, moved, &without).unwrap()
+        };
+        assert!((added(0, 5) - 0.5).abs() < 1e-4 && (added(0, -5) + 0.5).abs() < 1e-4);
+        assert!((added(counts(0.1), 0) + 0.5).abs() < 1e-4);
+        let little = added(counts(0.001), 0);
+        assert!(little < 0.0 && little > -0.1, "{little}");
+    }
+}
