@@ -1,11 +1,12 @@
 //! Progress while something is computed, on stderr: a bar on a terminal, elsewhere a plain line now and then.
 
+use std::fmt::Write;
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use upright_design::parallel::{Progress, ProgressStep};
 
 const SPINNER_STEP: Duration = Duration::from_millis(120);
@@ -19,6 +20,27 @@ pub fn with_spinner<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
         return with_lines(LINE_EVERY, &|line| eprintln!("{line}"), &stage, work);
     }
     let spinner = ProgressBar::new_spinner().with_message(message);
+    spinner.enable_steady_tick(SPINNER_STEP);
+    let result = work();
+    spinner.finish_and_clear();
+    result
+}
+
+/// The same for work that usually takes the time `usual`: also says how much of that is left.
+pub fn with_estimate<T>(message: &'static str, usual: Duration, work: impl FnOnce() -> T) -> T {
+    let begin = || ProgressStage { usual: Some(usual), ..ProgressStage::begin(message, 0) };
+    if !stderr().is_terminal() {
+        return with_lines(LINE_EVERY, &|line| eprintln!("{line}"), &Mutex::new(begin()), work);
+    }
+    let stage = begin();
+    let spinner = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {line}") {
+        let line = move |state: &ProgressState, text: &mut dyn Write| {
+            // A terminal takes everything.
+            let _ = text.write_str(&stage.line(state.elapsed()));
+        };
+        spinner.set_style(style.with_key("line", line));
+    }
     spinner.enable_steady_tick(SPINNER_STEP);
     let result = work();
     spinner.finish_and_clear();
@@ -61,6 +83,7 @@ pub fn with_bar<T>(stage: &str, steps: u64, work: impl FnOnce(&(dyn Fn() + Sync)
 }
 
 /// A stage of a computation, and how far it is.
+#[derive(Clone)]
 struct ProgressStage {
     name: String,
     done: u64,
@@ -69,11 +92,14 @@ struct ProgressStage {
     /// Number of candidates that a search has solved, and the figure of merit of the best.
     solved: (u32, f64),
     since: Instant,
+    /// How long it usually takes, where no steps are counted.
+    usual: Option<Duration>,
 }
 
 impl ProgressStage {
     fn begin(name: &str, steps: u64) -> Self {
-        Self { name: name.to_owned(), done: 0, steps, solved: (0, f64::INFINITY), since: Instant::now() }
+        let solved = (0, f64::INFINITY);
+        Self { name: name.to_owned(), done: 0, steps, solved, since: Instant::now(), usual: None }
     }
 
     fn take(&mut self, step: ProgressStep<'_>) {
@@ -97,10 +123,15 @@ impl ProgressStage {
 
     /// How far it is after this time, in a line.
     fn line(&self, spent: Duration) -> String {
-        let Self { name, done, steps, .. } = self;
+        let Self { name, done, steps, usual, .. } = self;
         let seconds = spent.as_secs();
         if *steps == 0 {
-            return format!("{name}: {seconds} s so far");
+            let left = usual.map(|usual| usual.as_secs().saturating_sub(seconds));
+            return match left {
+                Some(left_s @ 1..) => format!("{name}: {seconds} s so far, about {left_s} s left"),
+                Some(0) => format!("{name}: {seconds} s so far, longer than usual"),
+                None => format!("{name}: {seconds} s so far"),
+            };
         }
         let mut line = format!("{name}: {done} of {steps}, {seconds} s so far");
         if let Some(left_s) = (seconds * steps.saturating_sub(*done)).checked_div(*done) {
@@ -167,6 +198,9 @@ mod tests {
         let mut stage = ProgressStage::begin("designing", 0);
         let after = |stage: &ProgressStage, seconds| stage.line(Duration::from_secs(seconds));
         assert_eq!(after(&stage, 9), "designing: 9 s so far");
+        stage.usual = Some(Duration::from_secs(60));
+        assert_eq!(after(&stage, 16), "designing: 16 s so far, about 44 s left");
+        assert_eq!(after(&stage, 60), "designing: 60 s so far, longer than usual");
         stage.take(ProgressStep::Begin("trajectories", 40));
         assert_eq!(after(&stage, 8), "trajectories: 0 of 40, 8 s so far");
         (0..9).for_each(|_| stage.take(ProgressStep::Done));

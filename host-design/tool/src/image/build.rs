@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use upright::boards::{BoardRow, Family};
 use upright_design::rig::Rig;
@@ -16,6 +16,7 @@ use super::gains::CommittedGains;
 use super::kept;
 use super::limits::{check_table, counts, makes_tick};
 use super::uf2::uf2;
+use super::usual;
 use upright_command::project::checkout;
 
 /// The cargo profile that images are compiled with.
@@ -64,6 +65,23 @@ pub fn build_for(board: &'static BoardRow, rig: &Rig, table: &TableValues) -> Re
         write_atomically(&gains, source.as_bytes())?;
     }
     compile(board, &gains, &name)
+}
+
+/// How long it usually takes here to build an image of this board that is not there already.
+///
+/// # Errors
+/// [`BuildError`] if there is no folder for images.
+pub fn usual_duration(board: &BoardRow) -> Result<Duration, BuildError> {
+    let (images, target) = (images()?, Recipe::of(&board.family).target);
+    let folder = target_directory()?;
+    let is_first =
+        ![folder.clone(), folder.join("debian")].iter().any(|folder| has_libraries(folder, target));
+    Ok(usual::duration(&images, target, is_first))
+}
+
+/// Whether libraries have been compiled for a target in cargo's folder.
+fn has_libraries(folder: &Path, target: &str) -> bool {
+    folder.join(target).join(PROFILE).join("deps").exists()
 }
 
 /// How the image of a family is compiled.
@@ -120,8 +138,12 @@ fn compile(board: &'static BoardRow, gains: &Path, name: &str) -> Result<BuiltIm
     let built = target_directory.join(recipe.target).join(PROFILE).join(recipe.program);
     if !kept::is_current(&elf, &cargo, &version) {
         kept::forget(&elf);
+        let has_libraries = has_libraries(&target_directory, recipe.target);
         let begin = SystemTime::now();
         run(&mut cargo, program)?;
+        if let (true, Ok(taken)) = (has_libraries, begin.elapsed()) {
+            usual::keep(&images()?, recipe.target, taken);
+        }
         let bytes = read(&built)?;
         write_atomically(&elf, &with_reference(&built, bytes)?)?;
         let list = built.with_extension("d");

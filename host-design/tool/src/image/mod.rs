@@ -21,9 +21,10 @@ mod limits;
 mod size;
 mod stack;
 mod uf2;
+mod usual;
 mod virtual_board;
 
-pub use build::{BuiltImage, PROFILE, build, build_for};
+pub use build::{BuiltImage, PROFILE, build, build_for, usual_duration};
 pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler, compiler_for_chips};
 pub(crate) use compiler::{ForeignTarget, compiler_for};

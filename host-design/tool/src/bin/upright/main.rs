@@ -1,5 +1,6 @@
 //! The command-line tool: from a rig file to gains, gain table and closed loop.
 
+mod building;
 mod commission;
 mod compare;
 mod exit_status;

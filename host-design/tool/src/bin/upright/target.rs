@@ -10,8 +10,8 @@ use upright_design::table::TableValues;
 use upright_tool::image;
 use upright_tool::in_the_loop::RunPlace;
 
+use crate::building::building;
 use upright_command::Failure;
-use upright_command::progress::with_spinner;
 
 /// Where the firmware runs.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -42,8 +42,7 @@ impl TargetOption {
         match self {
             TargetOption::Host => Ok(Built::Host),
             TargetOption::Board => {
-                let image =
-                    with_spinner("building the image", || image::build_for(DEFAULT_BOARD, rig, table))?;
+                let image = building(DEFAULT_BOARD, || image::build_for(DEFAULT_BOARD, rig, table))?;
                 Ok(Built::Board(read(&image.elf)?, image::conditions(DEFAULT_BOARD, 1)?))
             }
         }

@@ -7,9 +7,9 @@ use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
 use upright_tool::image::{self, BuiltImage, CommittedGains};
 
+use crate::building::building;
 use crate::variation::{Wanted, with_stored_motions, with_table};
 use upright_command::Failure;
-use upright_command::progress::with_spinner;
 
 /// An image, and the rig and table that it is built from; none if it has src/gains.rs and that is made from no rig in
 /// `rigs/`.
@@ -20,10 +20,9 @@ pub(super) struct ForRig {
 
 /// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
 pub(super) fn built(board: &'static BoardRow, rig: Option<&Path>, wanted: Wanted) -> Result<ForRig, Failure> {
-    let building = "building the image";
     if let Some(path) = rig {
         let (rig, table) = designed_for(board, path, wanted)?;
-        let image = with_spinner(building, || image::build_for(board, &rig, &table))?;
+        let image = building(board, || image::build_for(board, &rig, &table))?;
         return Ok(ForRig { image, design: Some((rig, table)) });
     }
     let design = match CommittedGains::read()?.rig() {
@@ -34,7 +33,7 @@ pub(super) fn built(board: &'static BoardRow, rig: Option<&Path>, wanted: Wanted
     if let Some((_, table)) = &design {
         image::check_table(board, table)?;
     }
-    let image = with_spinner(building, || image::build(board))?;
+    let image = building(board, || image::build(board))?;
     Ok(ForRig { image, design })
 }
 

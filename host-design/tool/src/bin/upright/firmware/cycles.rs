@@ -17,6 +17,7 @@ use upright_trust::verify::at_rest_disturbed;
 
 use super::board::BoardOption;
 use super::built::{ForRig, designed};
+use crate::building::building;
 use crate::target::read;
 use crate::variation::{Wanted, law_option, positive};
 use upright_command::Failure;
@@ -56,7 +57,7 @@ impl CyclesCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let typical = conditions(self.on.board, 1)?;
         let (rig, table) = designed(&self.rig, Wanted::SwingUp)?;
-        let image = with_spinner("building the image", || image::build_for(self.on.board, &rig, &table))?;
+        let image = building(self.on.board, || image::build_for(self.on.board, &rig, &table))?;
         let image = read(&image.elf)?;
         let by = |timing| {
             let conditions = Conditions { timing, ..typical };
