@@ -1,7 +1,88 @@
-//! The checksum of an image in flash. The tool that links an image writes it into the vector table; the board compares
-//! it at every start, so code that was damaged before, by whatever, never drives the motor.
+//! What the tool writes into an image after it was compiled: the tables of a rig, behind the code, and a checksum.
+//!
+//! The code of an image is the same for all rigs of a size, so that a rig needs no compiler. Behind it, from the next
+//! word on, follow the words of
+//!
+//! | words | content |
+//! |---|---|
+//! | 1 | [`MARK`] |
+//! | 1 | [`LAYOUT`] |
+//! | 1 | CRC-32 of the board's name |
+//! | 1 | states, and sensors times 65536 |
+//! | 1 | number of words of the gain table |
+//! | 1 | number of words of the swing-up; 0 without one |
+//! | … | the gain table, as [`WordReader`] takes it |
+//! | … | the swing-up |
+//!
+//! The checksum of all of it is in the vector table; the board compares it at every start, so an image that was damaged
+//! before, by whatever, never drives the motor.
 
 use core::ops::Range;
+
+use crate::table::checksum::crc32;
+use crate::table::{Fill, FillTransitions, TransitionTable, WordReader};
+
+/// First word of the tables: "UPRT" in memory.
+pub const MARK: u32 = u32::from_le_bytes(*b"UPRT");
+
+/// Version of their layout; another one is refused.
+pub const LAYOUT: u32 = 1;
+
+/// Number of words before the gain table.
+const HEADER: usize = 6;
+
+/// The tables in an image for one board and one size of rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageTables<'t> {
+    /// All words, for the checksum; none, if there are no tables.
+    pub words: &'t [u32],
+    /// Those of the gain table; none, if they are for another board or size.
+    gains: &'t [u32],
+    /// Those of the swing-up.
+    swing_up: &'t [u32],
+}
+
+impl<'t> ImageTables<'t> {
+    /// What comes before the words of the gain table and of the swing-up, if these are so many.
+    pub fn header(
+        board: &str,
+        [states, sensors]: [usize; 2],
+        [gains, swing_up]: [usize; 2],
+    ) -> [u32; HEADER] {
+        let size = (states | sensors << 16) as u32;
+        [MARK, LAYOUT, crc32(0, board.as_bytes()), size, gains as u32, swing_up as u32]
+    }
+
+    /// The tables at the beginning of `flash`, in an image for `board` and rigs of this size. Words that are no tables,
+    /// or are those of something else, are taken as a table of zeros, which the firmware refuses.
+    pub fn at(flash: &'t [u32], board: &str, size: [usize; 2]) -> Self {
+        let none = Self { words: &[], gains: &[], swing_up: &[] };
+        let Some(&[.., gains, swing_up]) = flash.first_chunk::<HEADER>() else { return none };
+        let lengths = [gains as usize, swing_up as usize];
+        let Some((gains, rest)) = flash.get(HEADER..).and_then(|rest| rest.split_at_checked(lengths[0]))
+        else {
+            return none;
+        };
+        let Some(swing_up) = rest.get(..lengths[1]) else { return none };
+        let Some(words) = flash.get(..HEADER + gains.len() + swing_up.len()) else { return none };
+        match words.starts_with(&Self::header(board, size, lengths)) {
+            true => Self { words, gains, swing_up },
+            false => Self { words, ..none },
+        }
+    }
+
+    /// Fills the gain table.
+    pub fn fill_gains(&self, table: &mut impl Fill<'t>) {
+        table.fill(&mut WordReader::new(self.gains));
+    }
+
+    /// Fills the swing-up, with this room for transitions.
+    pub fn fill_swing_up(&self, table: &mut impl FillTransitions<'t>, room: &'t mut [TransitionTable<'t>]) {
+        let mut words = WordReader::new(self.swing_up);
+        table.fill(&mut words);
+        table.fill_transitions(words.skipped(), room);
+    }
+}
 
 /// Numbers of the words of the vector table that hold the checksum: ARM reserves them on every Cortex-M, and no
 /// processor reads them (Armv7-M Architecture Reference Manual, B1.5.3).

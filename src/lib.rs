@@ -13,7 +13,7 @@
 //! | [`protocol`] | messages, frames, the serial link |
 //! | [`board`] | the trait that a board implements: inputs of a tick, output to the motor |
 //! | [`boards`] | the boards that there is an image for |
-//! | [`flash_image`] | the checksum that an image in flash carries |
+//! | [`flash_image`] | the tables of a rig and the checksum in an image |
 //! | [`firmware`] | one tick of all of the above, and the control task that a timer starts |
 //!
 //! The whole firmware, as a control task runs it: the motor stays off until nothing prevents arming any more.
@@ -93,7 +93,8 @@ pub mod flash_image;
 #[allow(missing_docs)]
 pub mod gains;
 #[cfg(feature = "image")]
-/// The gain table of the image: the file that the environment variable UPRIGHT_GAINS names.
+/// The kind of rig that the image is for: the file that the environment variable UPRIGHT_GAINS names, of whose gain
+/// table only the numbers of states and sensors and the kinds of drive and sensors count.
 pub mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }

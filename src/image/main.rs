@@ -19,6 +19,9 @@ use stm32f4::stm32f405 as pac;
 #[cfg(feature = "stm32f446")]
 use stm32f4::stm32f446 as pac;
 
+use upright::gains::{self, SENSORS, STATES};
+use upright::table::{MOST_TRANSITIONS, SwingUp};
+
 #[cfg(not(any(feature = "stm32f405", feature = "stm32f446")))]
 compile_error!(
     "the image has no chip: build it with `cargo upright firmware build --board BOARD`, or choose one of the features \
@@ -27,23 +30,25 @@ compile_error!(
 #[cfg(all(feature = "stm32f405", feature = "stm32f446"))]
 compile_error!("the image has two chips: choose only one of the features stm32f405, stm32f446");
 
-use upright::gains;
-
-/// Processor cycles per tick, at the period for which the gains were designed.
-const CYCLES_PER_TICK: u32 = upright::boards::cycles_per_tick(gains::TICK_S, board::CLOCK_HZ, board::TICK_US);
+/// Room for transitions between equilibria, if the image has motions.
+const TRANSITIONS: usize =
+    if <gains::SwingUp as SwingUp<STATES, SENSORS>>::IS_POSSIBLE { MOST_TRANSITIONS } else { 0 };
 
 #[rtic::app(device = crate::pac, peripherals = true)]
 mod app {
     use upright::board::Board;
+    use upright::boards::cycles_per_tick;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
     use upright::firmware::{Firmware, hot_path};
-    use upright::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
+    use upright::gains::{SENSORS, STATES, SwingUp};
     use upright::heapless::spsc::Queue;
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
-    use upright::table::GainTable;
+    use upright::table::{Fill, GainTable, TransitionTable};
 
-    use crate::board::{Buffer, Hardware, MemoryCheck, SerialLine, set_up, start_ticks};
+    use crate::board::{
+        Buffer, CLOCK_HZ, Hardware, MemoryCheck, SerialLine, TICK_US, set_up, start_ticks, tables,
+    };
 
     #[shared]
     struct Shared {}
@@ -61,17 +66,26 @@ mod app {
         messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
         buffer: Buffer = Buffer::new(),
         // In RAM, which is read without wait states: in flash, many words cost five.
-        table: GainTable<STATES, SENSORS> = TABLE,
+        table: GainTable<STATES, SENSORS> = Fill::EMPTY,
+        // Both are compared all the time.
+        copy: GainTable<STATES, SENSORS> = Fill::EMPTY,
+        swing_up: SwingUp = Fill::EMPTY,
+        transitions: [TransitionTable<'static>; crate::TRANSITIONS] = Fill::EMPTY,
     ])]
     fn init(cx: init::Context) -> (Shared, TaskState) {
-        let table = &*cx.local.table;
-        let (hardware, line, memory, start) = set_up(cx.device, cx.local.buffer, table);
+        let tables = tables();
+        tables.fill_gains(cx.local.table);
+        tables.fill_gains(cx.local.copy);
+        tables.fill_swing_up(cx.local.swing_up, cx.local.transitions);
+        let (table, copy) = (&*cx.local.table, &*cx.local.copy);
+        let cycles = cycles_per_tick(table.tick_s, CLOCK_HZ, TICK_US);
+        let (hardware, line, memory, start) = set_up(cx.device, cx.local.buffer, [table, copy], cycles);
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
-        let firmware = Firmware::new(table, &SWING_UP, Hardware::WIDTHS, start);
+        let firmware = Firmware::new(table, cx.local.swing_up, Hardware::WIDTHS, start);
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();
-        start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);
+        start_ticks(cx.core.SYST, cycles);
         (Shared {}, TaskState { control, link: SerialLink::new(to_control, to_link), line, memory })
     }
 

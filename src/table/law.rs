@@ -12,6 +12,8 @@ use crate::table::columns::columns;
 #[cfg(test)]
 use crate::table::part::WordsMut;
 use crate::table::part::{Part, Reader, Resize, Words, part};
+#[cfg(feature = "firmware")]
+use crate::table::words::{Fill, WordReader};
 
 /// A control law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -173,6 +175,16 @@ impl<P: Part> Part for PerLaw<P> {
             self[law].read(reader);
         }
         reader.end();
+    }
+}
+
+#[cfg(feature = "firmware")]
+impl<'words, P: Fill<'words>> Fill<'words> for PerLaw<P> {
+    const EMPTY: Self = Self { lqr: P::EMPTY, pole_placement: P::EMPTY };
+
+    fn fill(&mut self, words: &mut WordReader<'words>) {
+        self.lqr.fill(words);
+        self.pole_placement.fill(words);
     }
 }
 

@@ -36,6 +36,8 @@ mod steps;
 mod stilling;
 mod swing_up;
 mod thresholds;
+#[cfg(feature = "firmware")]
+mod words;
 
 pub use crate::numbers::{Number, Scalar};
 pub use chain_model::{ChainModel, Turning};
@@ -58,8 +60,14 @@ pub use part::{Part, Reader, Resize, Shape, Variant, Words};
 pub use sensor::{ReadingMap, SensorKind, SensorRow};
 pub use steps::StepMap;
 pub use stilling::{ImitatedBase, StillingGains};
-pub use swing_up::{MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable};
+#[cfg(feature = "firmware")]
+pub use swing_up::FillTransitions;
+pub use swing_up::{
+    MOST_TRANSITIONS, MotionLimits, MotionTable, Motions, NoSwingUp, SwingUp, SwingUpTable, TransitionTable,
+};
 pub use thresholds::{MotorTest, Thresholds};
+#[cfg(feature = "firmware")]
+pub use words::{Fill, WordReader};
 
 #[cfg(test)]
 mod tests;

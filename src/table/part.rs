@@ -433,6 +433,22 @@ macro_rules! part {
             }
         }
 
+        #[cfg(feature = "firmware")]
+        impl<'words, $($life,)? $(const $size: usize),*> $crate::table::Fill<'words>
+            for $name<$($life,)? $($size),*>
+        where
+            $('words: $life,)?
+        {
+            const EMPTY: Self =
+                Self { $($field: $crate::table::Fill::EMPTY,)+ $($seal: 0)? };
+
+            fn fill(&mut self, words: &mut $crate::table::WordReader<'words>) {
+                let Self { $($field,)+ $($seal)? } = self;
+                $($crate::table::Fill::fill($field, words);)+
+                $(*$seal = words.word();)?
+            }
+        }
+
         impl<$($life,)? $(const $size: usize, const $other: usize),*>
             $crate::table::part::Resize<$name<$($life,)? $($other),*>> for $name<$($life,)? $($size),*>
         {
@@ -489,6 +505,27 @@ macro_rules! part {
                         });
                         held.iter().for_each(|read| read(reader));
                     })+
+                }
+            }
+        }
+
+        #[cfg(feature = "firmware")]
+        impl<'words> $crate::table::Fill<'words> for $name {
+            const EMPTY: Self = $(if $number == 0 {
+                Self::$variant $(({ let $part = $crate::table::Fill::EMPTY; $part }))?
+            } else)+ {
+                panic!("no variant has the number 0")
+            };
+
+            fn fill(&mut self, words: &mut $crate::table::WordReader<'words>) {
+                match words.word() {
+                    $($number => {
+                        *self = Self::$variant $(({
+                            let $part = words.part();
+                            $part
+                        }))?;
+                    })+
+                    _ => words.refuse(),
                 }
             }
         }

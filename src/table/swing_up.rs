@@ -14,6 +14,8 @@ use crate::table::gain_table::GainTable;
 use crate::table::part::WordsMut;
 use crate::table::part::{Part, Reader, Resize, Shape, Words, is_finite, part};
 use crate::table::thresholds::Thresholds;
+#[cfg(feature = "firmware")]
+use crate::table::words::{Fill, WordReader};
 
 part! {
     /// A planned motion with its gains.
@@ -51,6 +53,9 @@ part! {
     }
 }
 
+/// Most transitions that an image has room for: those of three links.
+pub const MOST_TRANSITIONS: usize = 54;
+
 impl Part for &[TransitionTable<'_>] {
     fn part(&self, at: &mut usize) -> Option<Words<'_>> {
         self.iter().find_map(|transition| transition.part(at))
@@ -64,6 +69,16 @@ impl Part for &[TransitionTable<'_>] {
     fn read(&self, reader: &mut dyn Reader) {
         reader.list(self.len(), Shape::Slice);
         self.iter().for_each(|transition| transition.read(reader));
+    }
+}
+
+/// The transitions are left out: see [`FillTransitions`].
+#[cfg(feature = "firmware")]
+impl<'t, 'words: 't> Fill<'words> for &'t [TransitionTable<'t>] {
+    const EMPTY: Self = &[];
+
+    fn fill(&mut self, words: &mut WordReader<'words>) {
+        words.skip_list::<TransitionTable<'_>>();
     }
 }
 
@@ -130,6 +145,29 @@ part! {
         sealed by
         /// CRC-32 (ISO-HDLC) of all fields above.
         pub crc,
+    }
+}
+
+/// A swing-up whose transitions need room of their own when it is filled.
+#[cfg(feature = "firmware")]
+pub trait FillTransitions<'t>: Fill<'t> {
+    /// Reads the transitions from `words`, their number first, into this room. Without enough room there are none, and
+    /// the check of the swing-up fails.
+    fn fill_transitions(&mut self, words: WordReader<'t>, room: &'t mut [TransitionTable<'t>]);
+}
+
+#[cfg(feature = "firmware")]
+impl<'t> FillTransitions<'t> for NoSwingUp {
+    fn fill_transitions(&mut self, _: WordReader<'t>, _: &'t mut [TransitionTable<'t>]) {}
+}
+
+#[cfg(feature = "firmware")]
+impl<'t, const NY: usize, const N: usize> FillTransitions<'t> for SwingUpTable<'t, NY, N> {
+    fn fill_transitions(&mut self, mut words: WordReader<'t>, room: &'t mut [TransitionTable<'t>]) {
+        if let Some(list) = room.get_mut(..words.word() as usize) {
+            list.iter_mut().for_each(|transition| transition.fill(&mut words));
+            self.others = list;
+        }
     }
 }
 
@@ -249,6 +287,13 @@ impl<'t, const NY: usize> Motions<'t, NY> {
 /// The swing-up of a rig file without `[swing_up]`: there are no motions.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoSwingUp;
+
+#[cfg(feature = "firmware")]
+impl Fill<'_> for NoSwingUp {
+    const EMPTY: Self = Self;
+
+    fn fill(&mut self, _: &mut WordReader<'_>) {}
+}
 
 impl<const NX: usize, const NY: usize> SwingUp<NX, NY> for NoSwingUp {
     const IS_POSSIBLE: bool = false;

@@ -21,6 +21,7 @@ mod gains;
 mod gains_table;
 mod governor;
 mod homing;
+mod image_tables;
 mod in_the_loop;
 mod integral;
 mod lockstep;

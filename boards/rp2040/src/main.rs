@@ -11,26 +11,34 @@
 #![no_main]
 
 mod board;
-/// The gain table in the file that UPRIGHT_GAINS names.
-#[allow(dead_code, reason = "an image does not need its name")]
+/// The kind of rig in the file that UPRIGHT_GAINS names.
+#[allow(dead_code, reason = "of a gain table, only the kinds of drive and sensors count")]
 mod gains {
     include!(env!("UPRIGHT_GAINS"));
 }
 
-/// Processor cycles per tick, at the period for which the gains were designed.
-const CYCLES_PER_TICK: u32 = upright::boards::cycles_per_tick(gains::TICK_S, board::CLOCK_HZ, board::TICK_US);
+use gains::{SENSORS, STATES};
+use upright::table::{MOST_TRANSITIONS, SwingUp};
+
+/// Room for transitions between equilibria, if the image has motions.
+const TRANSITIONS: usize =
+    if <gains::SwingUp as SwingUp<STATES, SENSORS>>::IS_POSSIBLE { MOST_TRANSITIONS } else { 0 };
 
 #[rtic::app(device = hal::pac, peripherals = true)]
 mod app {
-    use crate::gains::{SENSORS, STATES, SWING_UP, SwingUp, TABLE};
+    use crate::gains::{SENSORS, STATES, SwingUp};
     use upright::board::Board;
+    use upright::boards::cycles_per_tick;
     use upright::firmware::Firmware;
     use upright::firmware::control_task::{COMMANDS, ControlTask, MESSAGES};
     use upright::heapless::spsc::Queue;
     use upright::protocol::message::{Command, Message};
     use upright::protocol::serial_link::SerialLink;
+    use upright::table::{Fill, GainTable, TransitionTable};
 
-    use crate::board::{Hardware, SerialLine, UsbMemory, set_up, start_ticks};
+    use crate::board::{
+        CLOCK_HZ, Hardware, SerialLine, TICK_US, UsbMemory, set_up, start_ticks, tables,
+    };
 
     #[shared]
     struct Shared {}
@@ -46,15 +54,22 @@ mod app {
         commands: Queue<Command, COMMANDS> = Queue::new(),
         messages: Queue<Message<STATES, SENSORS>, MESSAGES> = Queue::new(),
         memory: UsbMemory = UsbMemory::new(),
+        table: GainTable<STATES, SENSORS> = Fill::EMPTY,
+        swing_up: SwingUp = Fill::EMPTY,
+        transitions: [TransitionTable<'static>; crate::TRANSITIONS] = Fill::EMPTY,
     ])]
     fn init(cx: init::Context) -> (Shared, TaskState) {
-        let (hardware, line, start) = set_up(cx.device, cx.local.memory);
+        let tables = tables();
+        tables.fill_gains(cx.local.table);
+        tables.fill_swing_up(cx.local.swing_up, cx.local.transitions);
+        let cycles = cycles_per_tick(cx.local.table.tick_s, CLOCK_HZ, TICK_US);
+        let (hardware, line, start) = set_up(cx.device, cx.local.memory, cycles);
         let (to_control, commands) = cx.local.commands.split();
         let (messages, to_link) = cx.local.messages.split();
-        let firmware = Firmware::new(&TABLE, &SWING_UP, Hardware::WIDTHS, start);
+        let firmware = Firmware::new(cx.local.table, cx.local.swing_up, Hardware::WIDTHS, start);
         let mut control = ControlTask::new(firmware, hardware, commands, messages);
         control.board().start_watchdog();
-        start_ticks(cx.core.SYST, crate::CYCLES_PER_TICK);
+        start_ticks(cx.core.SYST, cycles);
         (Shared {}, TaskState { control, link: SerialLink::new(to_control, to_link), line })
     }
 

@@ -2,9 +2,9 @@
 //!
 //! A family of boards is a folder such as `f4`. Another one would provide the same names: `set_up` makes
 //! a [`Hardware`] for the control task and a [`SerialLine`] for the background task, with a [`Buffer`] for its bytes,
-//! and a [`MemoryCheck`] that finds memory that has changed; `start_ticks` starts the interrupt of the control task,
-//! and `sleep` waits for an interrupt; `stop` turns the motor off for good; `CLOCK_HZ` is the core clock, `TICK_US` the
-//! range of ticks.
+//! and a [`MemoryCheck`] that finds memory that has changed; `tables` are those of the rig; `start_ticks` starts the
+//! interrupt of the control task, and `sleep` waits for an interrupt; `stop` turns the motor off for good;
+//! `CLOCK_HZ` is the core clock, `TICK_US` the range of ticks.
 
 #![allow(unsafe_code)]
 
@@ -16,7 +16,7 @@ mod handlers;
 use f4::sleep;
 pub(crate) use f4::{
     CLOCK_HZ, DmaBuffer as Buffer, DmaLine as SerialLine, F4Hardware as Hardware, MemoryCheck, TICK_US,
-    set_up, start_ticks, stop,
+    set_up, start_ticks, stop, tables,
 };
 pub(crate) use handlers::stop_for_memory;
 

@@ -8,18 +8,12 @@ use hal::pac::WATCHDOG;
 use upright::flash_image::WordSums;
 use upright::protocol::message::{CrashRecord, Reset, Start};
 
+use super::memory::words;
 use super::stop::stop;
 
 /// Mark of a crash that caused the last reset, and of an older one.
 const NEW: u32 = 0x5afe_2040;
 const OLD: u32 = 0x5afe_2041;
-
-unsafe extern "C" {
-    static __sdata: u32;
-    static __edata: u32;
-    static __sidata: u32;
-    static __vector_table: u32;
-}
 
 /// Why the program started, and the record of the last crash since power-on; and whether the image is damaged.
 pub(super) fn start(watchdog: &WATCHDOG) -> (Start, bool) {
@@ -38,17 +32,6 @@ pub(super) fn start(watchdog: &WATCHDOG) -> (Start, bool) {
     let crash = matches!(mark, NEW | OLD).then_some(CrashRecord(record));
     let image = WordSums::of_image(words());
     (Start { reset, crash, image: image.weighted }, image != WordSums::carried_by(words()))
-}
-
-/// The image in flash, from its vector table on: the boot ROM checks what an RP2040 has before it.
-fn words() -> &'static [u32] {
-    // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
-    unsafe {
-        let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
-        let end = (&raw const __sidata) as usize + values;
-        let begin = &raw const __vector_table;
-        core::slice::from_raw_parts(begin, (end - begin as usize) / 4)
-    }
 }
 
 fn record(pc: u32, lr: u32) {

@@ -6,7 +6,6 @@ use hal::pac::PIO1;
 use super::encoders::LENGTH;
 use super::pins::{EMERGENCY_STOP, ENABLE};
 use super::state_machine::{Course, load, run, start};
-use crate::CYCLES_PER_TICK;
 
 /// Where the program begins; it fills the rest of the instruction memory.
 const ORIGIN: u16 = LENGTH as u16;
@@ -27,31 +26,30 @@ const PROGRAM: [u16; 8] = [
 const ROUND: u32 = 6;
 const NUMBER: usize = 3;
 
-/// Three ticks.
-const HOLD: u32 = 3 * CYCLES_PER_TICK / ROUND;
-
 /// set pins, 0 and set pindirs, 1
 const OUTPUT: [u16; 2] = [0xe000, 0xe081];
 
 /// The state machine.
 pub(super) struct Guard {
     pio: PIO1,
+    /// Rounds in three ticks.
+    hold: u32,
 }
 
 impl Guard {
-    /// Starts it, with the enable output low.
-    pub(super) fn set_up(pio: PIO1) -> Self {
+    /// Starts it, with the enable output low, for ticks of so many processor cycles.
+    pub(super) fn set_up(pio: PIO1, tick_cycles: u32) -> Self {
         load(&pio, ORIGIN.into(), &PROGRAM);
         let pins = 1 << 26 | (ENABLE as u32) << 5;
         let off = u32::from(OFF);
         let course = Course { begin: off, repeat: BEGIN.into(), last: off + 1, divider: 1 };
         start(&pio, NUMBER, course, pins, EMERGENCY_STOP, &OUTPUT);
-        Self { pio }
+        Self { pio, hold: 3 * tick_cycles / ROUND }
     }
 
     /// Enables the power stage for three ticks.
     pub(super) fn hold(&self) {
-        self.set(HOLD);
+        self.set(self.hold);
     }
 
     /// Disables the power stage.

@@ -11,6 +11,7 @@ mod copying;
 mod crash;
 mod encoders;
 mod guard;
+mod memory;
 mod motor;
 mod pins;
 mod state_machine;
@@ -31,9 +32,9 @@ pub(crate) use upright::boards::rp::TICK_US;
 use upright::control::encoder::CounterWidth;
 use upright::protocol::message::Start;
 
-use crate::CYCLES_PER_TICK;
 pub(crate) use chip::CLOCK_HZ;
 use encoders::Encoders;
+pub(crate) use memory::tables;
 use motor::Motor;
 use pins::GIVES_PULSES;
 use steps::Steps;
@@ -50,6 +51,8 @@ pub(crate) struct Hardware {
     motor: Motor,
     supply: Supply,
     watchdog: Watchdog,
+    /// Processor cycles in a tick.
+    tick_cycles: u32,
     /// Ticks of the timer that were over before the tick had ended.
     wraps: u32,
     image_is_damaged: bool,
@@ -58,8 +61,13 @@ pub(crate) struct Hardware {
     limits: [bool; 2],
 }
 
-/// Sets up all peripherals but the watchdog, with the motor off. Also returns what the board knows about the start.
-pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Hardware, SerialLine, Start) {
+/// Sets up all peripherals but the watchdog, for ticks of so many processor cycles, with the motor off. Also returns
+/// what the board knows about the start.
+pub(crate) fn set_up(
+    device: Peripherals,
+    memory: &'static mut UsbMemory,
+    tick_cycles: u32,
+) -> (Hardware, SerialLine, Start) {
     let (start, image_is_damaged) = crash::start(&device.WATCHDOG);
     let mut resets = device.RESETS;
     pins::set_up(&resets, &device.PADS_BANK0, &device.IO_BANK0);
@@ -76,8 +84,8 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
         stop()
     };
     let encoders = Encoders::set_up(&device.PIO0, &device.PIO1);
-    let steps = GIVES_PULSES.then(|| Steps::set_up(&device.PIO0));
-    let motor = Motor::set_up(&device.PWM, guard::Guard::set_up(device.PIO1), steps);
+    let steps = GIVES_PULSES.then(|| Steps::set_up(&device.PIO0, tick_cycles));
+    let motor = Motor::set_up(&device.PWM, guard::Guard::set_up(device.PIO1, tick_cycles), steps);
     let supply = Supply::set_up(device.ADC);
     let bus = usb::bus(clocks.usb_clock, &mut resets);
     let Some(line) = SerialLine::set_up(bus, memory) else { stop() };
@@ -88,6 +96,7 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
         motor,
         supply,
         watchdog,
+        tick_cycles,
         wraps: 0,
         image_is_damaged,
         overrun: false,
@@ -99,7 +108,8 @@ pub(crate) fn set_up(device: Peripherals, memory: &'static mut UsbMemory) -> (Ha
 impl Hardware {
     /// Starts the watchdog: three ticks and a tenth of a millisecond. Everything has to be ready for the first tick.
     pub(crate) fn start_watchdog(&mut self) {
-        self.watchdog.start(MicrosDurationU32::micros(3 * (CYCLES_PER_TICK / (CLOCK_HZ / 1_000_000)) + 100));
+        let tick_us = self.tick_cycles / (CLOCK_HZ / 1_000_000);
+        self.watchdog.start(MicrosDurationU32::micros(3 * tick_us + 100));
     }
 }
 
@@ -139,7 +149,7 @@ impl Board<SENSORS> for Hardware {
     }
 
     fn tick_s(&self) -> f32 {
-        CYCLES_PER_TICK as f32 / CLOCK_HZ as f32
+        self.tick_cycles as f32 / CLOCK_HZ as f32
     }
 
     fn drive(&mut self, output: &Output) {
@@ -158,8 +168,8 @@ impl Board<SENSORS> for Hardware {
 
     /// From the tick's timer, which counts down.
     fn cycles(&self) -> u32 {
-        let elapsed = CYCLES_PER_TICK.wrapping_sub(SYST::get_current());
-        self.wraps.wrapping_mul(CYCLES_PER_TICK).wrapping_add(elapsed)
+        let elapsed = self.tick_cycles.wrapping_sub(SYST::get_current());
+        self.wraps.wrapping_mul(self.tick_cycles).wrapping_add(elapsed)
     }
 }
 

@@ -7,7 +7,6 @@ use hal::pac::pio0::RegisterBlock;
 use super::encoders::LENGTH;
 use super::pins::{DIRECTION, STEP};
 use super::state_machine::{Course, load, restart, run, start};
-use crate::CYCLES_PER_TICK;
 
 /// Where the program begins; it fills the rest of the instruction memory.
 const ORIGIN: u16 = LENGTH as u16;
@@ -34,16 +33,13 @@ const NUMBER: usize = 0;
 /// Most pulses in a tick.
 const MOST: u32 = upright::boards::rp::PULSES;
 
-/// Divider of the clock: with it, half a tick fits into 19 bits.
-const DIVIDER: u32 = CYCLES_PER_TICK / (2 << 19) + 1;
-/// Cycles of the state machine that the pulses of a tick may take.
-const CYCLES: u32 = CYCLES_PER_TICK / DIVIDER - REST;
-
 /// set pins, 0 and set pindirs, 3
 const OUTPUTS: [u16; 2] = [0xe000, 0xe083];
 
 /// The state machine.
 pub(super) struct Steps {
+    /// Cycles of the state machine that the pulses of a tick may take.
+    cycles: u32,
     given: u32,
 }
 
@@ -53,19 +49,21 @@ fn pio() -> &'static RegisterBlock {
 }
 
 impl Steps {
-    /// Starts it, without pulses.
-    pub(super) fn set_up(pio: &PIO0) -> Self {
+    /// Starts it, without pulses, for ticks of so many processor cycles.
+    pub(super) fn set_up(pio: &PIO0, tick_cycles: u32) -> Self {
+        // With this divider of the clock, half a tick fits into 19 bits.
+        let divider = tick_cycles / (2 << 19) + 1;
         load(pio, ORIGIN.into(), &PROGRAM);
         let pins = 1 << 29 | 2 << 26 | 1 << 20 | (STEP as u32) << 10 | (STEP as u32) << 5 | DIRECTION as u32;
-        let course = Course { begin: PULL.into(), repeat: ORIGIN.into(), last: 31, divider: DIVIDER };
+        let course = Course { begin: PULL.into(), repeat: ORIGIN.into(), last: 31, divider };
         start(pio, NUMBER, course, pins, 0, &OUTPUTS);
-        Self { given: 0 }
+        Self { cycles: tick_cycles.checked_div(divider).unwrap_or(tick_cycles) - REST, given: 0 }
     }
 
     /// Gives pulses until the next tick, positive along +x. The direction changes half an interval before the first.
     pub(super) fn give(&mut self, pulses: i32) {
         let number = pulses.unsigned_abs().min(MOST);
-        let Some(interval) = CYCLES.checked_div(number) else { return };
+        let Some(interval) = self.cycles.checked_div(number) else { return };
         let half = interval.saturating_sub(OVERHEAD) / 2;
         let word = half << 13 | (number - 1) << 1 | u32::from(pulses > 0);
         // SAFETY: any word. The queue is empty: the pulses of the tick before have begun.

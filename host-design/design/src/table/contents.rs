@@ -90,7 +90,12 @@ pub(super) fn bytes(fields: &[Field]) -> usize {
     all_bytes(fields).len()
 }
 
-/// The words of these fields in the order of declaration, the low byte first.
+/// The words of these fields in the order of declaration.
+pub(super) fn words(fields: &[Field]) -> Vec<u32> {
+    all_bytes(fields).as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
+}
+
+/// The same, the low byte first.
 fn all_bytes(fields: &[Field]) -> Vec<u8> {
     fields.iter().flat_map(|field| bytes_of(&field.value)).collect()
 }

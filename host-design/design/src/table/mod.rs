@@ -13,9 +13,11 @@
 //! ```
 
 mod any_size;
+mod class;
 mod contents;
 mod error;
 mod friction;
+mod image;
 mod source;
 mod stilling;
 mod supervision;
@@ -26,7 +28,9 @@ mod write;
 
 pub use any_size::widest;
 pub use any_size::{MAX_MODEL_SENSORS, MAX_SENSORS, MAX_STATES, WithSize, with_firmware_size, with_size};
+pub use class::class_source;
 pub use error::NoTable;
+pub use image::image_tables;
 pub use source::{gains_source, identity_differences};
 pub use swing_up::{MotionValues, SwingUpValues};
 pub use values::{Gains, LawValues, TableValues, step_map};

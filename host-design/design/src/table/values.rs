@@ -215,6 +215,11 @@ impl TableValues {
         contents::checksum(&self.fields())
     }
 
+    /// The words of which [`crc`](Self::crc) is the checksum.
+    pub(super) fn words(&self) -> Vec<u32> {
+        contents::words(&self.fields())
+    }
+
     /// Bytes of its values.
     pub fn bytes(&self) -> usize {
         contents::bytes(&self.fields())

@@ -1,6 +1,8 @@
 //! Defects that only a board has, on the virtual board: its conditions at power-up, and the events in the tick of the
 //! onset.
 
+use core::ops::Range;
+
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use upright_board::{
@@ -116,9 +118,8 @@ impl OnChip for Defect {
                 vec![Event::Bytes { bytes, baud: 460_800 }]
             }
             Defect::TableBit => {
-                let words = table_words(image);
-                let word = words[(trial.size * words.len() as f64) as usize % words.len()];
-                vec![at(anywhere, bit_of(word, 4))]
+                let table = gain_table(image);
+                vec![at(anywhere, bit_of(table.start, table.end - table.start))]
             }
             Defect::RamBit => {
                 // Half of these bits are in the state of the control task, which is a ninth of the memory.
@@ -164,17 +165,10 @@ fn of_absolute_sensor(trial: &Trial, table: &TableValues, tick: Time, random: &m
     }
 }
 
-/// Addresses in RAM of the gain table's words that are not 0. An absent part of the table is 0, and is never read.
+/// The gain table in RAM.
 ///
 /// # Panics
 /// If the image has no such table: it is one of ours.
-fn table_words(image: &Image) -> Vec<u32> {
-    let symbols = ["__sdata", "__sidata"].map(|name| image.symbol(name));
-    let (Some(table), [Some(ram), Some(flash)]) = (image.object("local_init_table"), symbols) else {
-        panic!("an image without a gain table in RAM");
-    };
-    let bytes = image.flash();
-    let initial = &bytes[(table.start - ram + (flash & 0x00ff_ffff)) as usize..];
-    let words = table.step_by(4).zip(initial.as_chunks::<4>().0);
-    words.filter(|(_, word)| **word != [0; 4]).map(|(address, _)| address).collect()
+fn gain_table(image: &Image) -> Range<u32> {
+    image.object("local_init_table").unwrap_or_else(|| panic!("an image without a gain table in RAM"))
 }

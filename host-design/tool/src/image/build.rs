@@ -6,15 +6,16 @@ use std::process::Command;
 use std::time::{Duration, SystemTime};
 
 use upright::boards::{BoardRow, Family};
+use upright::table::checksum::crc32;
 use upright_design::rig::Rig;
-use upright_design::table::{TableValues, gains_source, write_atomically};
+use upright_design::table::{TableValues, class_source, image_tables, write_atomically};
 
 use super::checksum::with_reference;
 use super::compiler::{Compiler, compiler_for_chips, target_directory};
 use super::error::{BuildError, TARGET};
-use super::gains::CommittedGains;
 use super::kept;
-use super::limits::{check_table, counts, makes_tick};
+use super::limits::check_table;
+use super::tables::with_tables;
 use super::uf2::uf2;
 use super::usual;
 use upright_command::project::checkout;
@@ -38,33 +39,25 @@ impl BuiltImage {
     }
 }
 
-/// Builds the image with the committed gain table, `src/gains.rs`.
+/// Builds the image with the tables of `rig`: compiles the code for rigs like it, unless that is there already, and
+/// writes the tables into it.
 ///
 /// # Errors
-/// [`BuildError`] if the board cannot serve the table's rig, there is no compiler, or it fails.
-pub fn build(board: &'static BoardRow) -> Result<BuiltImage, BuildError> {
-    let gains = CommittedGains::read()?;
-    counts(board, gains.sensors)?;
-    makes_tick(board, gains.tick_s)?;
-    compile(board, &gains.path, board.name)
-}
-
-/// Builds the image with the table of `rig` in place of `src/gains.rs`.
-///
-/// # Errors
-/// As for [`build`].
+/// [`BuildError`] if the board cannot serve the rig, there is no compiler, or it fails.
 pub fn build_for(board: &'static BoardRow, rig: &Rig, table: &TableValues) -> Result<BuiltImage, BuildError> {
     check_table(board, table)?;
+    let code = compile(board, table)?;
     let mut name = format!("{board}-{:016x}-{:08x}", rig.hash(), table.crc());
     if let Some(crc) = table.swing_up_crc() {
         name += &format!("-{crc:08x}");
     }
-    let (gains, source) = (images()?.join(format!("{name}.rs")), gains_source(rig, table));
-    // An unchanged file stays as it is, so that nothing is compiled again.
-    if std::fs::read_to_string(&gains).ok().as_ref() != Some(&source) {
-        write_atomically(&gains, source.as_bytes())?;
-    }
-    compile(board, &gains, &name)
+    let elf = images()?.join(format!("{name}.elf"));
+    let bytes = with_tables(&code, &read(&code)?, &image_tables(board, table))?;
+    write_atomically(&elf, &with_reference(&elf, bytes)?)?;
+    let Family::Rp(rp) = &board.family else { return Ok(BuiltImage { elf, uf2: None }) };
+    let path = elf.with_extension("uf2");
+    write_atomically(&path, &uf2(rp.chip.uf2_family(), &elf, &read(&elf)?)?)?;
+    Ok(BuiltImage { elf, uf2: Some(path) })
 }
 
 /// How long it usually takes here to build an image of this board that is not there already.
@@ -125,17 +118,23 @@ impl Recipe {
     }
 }
 
-fn compile(board: &'static BoardRow, gains: &Path, name: &str) -> Result<BuiltImage, BuildError> {
+/// The ELF file of the code for rigs like that of `table`, without tables.
+fn compile(board: &'static BoardRow, table: &TableValues) -> Result<PathBuf, BuildError> {
     let root = checkout()?;
     let _others_wait = one_at_a_time()?;
+    let source = class_source(table);
+    let name = format!("{board}-{}x{}-{:08x}", table.states(), table.sensors(), crc32(0, source.as_bytes()));
+    let (gains, elf) = (images()?.join(format!("{name}.rs")), images()?.join(format!("{name}.elf")));
+    // An unchanged file stays as it is, so that nothing is compiled again.
+    if std::fs::read_to_string(&gains).ok().as_ref() != Some(&source) {
+        write_atomically(&gains, source.as_bytes())?;
+    }
     let recipe = Recipe::of(&board.family);
     let Compiler { program, version, mut cargo, target_directory } = compiler_for_chips(&[recipe.target])?;
-    cargo.current_dir(root.join(recipe.folder)).env("UPRIGHT_BOARD", board.name).env("UPRIGHT_GAINS", gains);
+    let folder = root.join(recipe.folder);
+    cargo.current_dir(&folder).env("UPRIGHT_BOARD", board.name).env("UPRIGHT_GAINS", &gains);
     cargo.args(["rustc", "--quiet", "--profile", PROFILE, "--target", recipe.target]);
     cargo.args(&recipe.cargo).arg("--").args(recipe.rustc);
-    let elf = images()?.join(format!("{name}.elf"));
-    let folder = root.join(recipe.folder);
-    let built = target_directory.join(recipe.target).join(PROFILE).join(recipe.program);
     if !kept::is_current(&elf, &cargo, &version) {
         kept::forget(&elf);
         let has_libraries = has_libraries(&target_directory, recipe.target);
@@ -144,16 +143,13 @@ fn compile(board: &'static BoardRow, gains: &Path, name: &str) -> Result<BuiltIm
         if let (true, Ok(taken)) = (has_libraries, begin.elapsed()) {
             usual::keep(&images()?, recipe.target, taken);
         }
-        let bytes = read(&built)?;
-        write_atomically(&elf, &with_reference(&built, bytes)?)?;
+        let built = target_directory.join(recipe.target).join(PROFILE).join(recipe.program);
+        write_atomically(&elf, &read(&built)?)?;
         let list = built.with_extension("d");
         kept::keep(&elf, &cargo, &version, begin, &list, &[&root, &folder])
             .map_err(|source| BuildError::File { path: list, source })?;
     }
-    let Family::Rp(rp) = &board.family else { return Ok(BuiltImage { elf, uf2: None }) };
-    let path = elf.with_extension("uf2");
-    write_atomically(&path, &uf2(rp.chip.uf2_family(), &elf, &read(&elf)?)?)?;
-    Ok(BuiltImage { elf, uf2: Some(path) })
+    Ok(elf)
 }
 
 fn run(cargo: &mut Command, program: &'static str) -> Result<(), BuildError> {

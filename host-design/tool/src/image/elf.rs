@@ -25,6 +25,14 @@ pub enum ElfError {
         /// Why.
         source: object::Error,
     },
+    /// The file cannot be changed.
+    #[error("{}: {source}", path.display())]
+    Rewrite {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: object::build::Error,
+    },
     /// A section or symbol that every image has is missing.
     #[error("{}: no {what}; `upright firmware build` makes an image that has it", path.display())]
     Missing {

@@ -127,6 +127,20 @@ pub enum BuildError {
         /// Its path.
         path: PathBuf,
     },
+    /// `src/gains.rs` is made from no rig in `rigs/`.
+    #[error("{}: made from no rig in rigs/: name its rig file after `firmware build`", path.display())]
+    NoRig {
+        /// Its path.
+        path: PathBuf,
+    },
+    /// `src/gains.rs` is another table than the one that is designed from its rig.
+    #[error("{}: not the table of {}: write it again with `upright design {}`", path.display(), rig.display(), rig.display())]
+    OtherGains {
+        /// Its path.
+        path: PathBuf,
+        /// The rig file that it is made from.
+        rig: PathBuf,
+    },
     /// The image cannot be read.
     #[error(transparent)]
     Elf(#[from] ElfError),

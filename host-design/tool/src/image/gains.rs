@@ -14,10 +14,8 @@ pub struct CommittedGains {
     pub path: PathBuf,
     /// Hash of the values of its rig file.
     pub rig_hash: u64,
-    /// Number of sensors.
-    pub sensors: usize,
-    /// Tick (s).
-    pub tick_s: f64,
+    /// Its checksum.
+    pub crc: u32,
 }
 
 impl CommittedGains {
@@ -29,13 +27,11 @@ impl CommittedGains {
         let path = checkout()?.join("src/gains.rs");
         let text = std::fs::read_to_string(&path)
             .map_err(|source| BuildError::File { path: path.clone(), source })?;
-        let hash = constant(&text, "RIG_HASH").map(|hash| hash.trim_start_matches("0x").replace('_', ""));
-        let parsed = hash.and_then(|hash| u64::from_str_radix(&hash, 16).ok()).and_then(|rig_hash| {
-            let sensors = constant(&text, "SENSORS")?.parse().ok()?;
-            Some((rig_hash, sensors, constant(&text, "TICK_S")?.parse().ok()?))
-        });
-        let Some((rig_hash, sensors, tick_s)) = parsed else { return Err(BuildError::NoGains { path }) };
-        Ok(Self { path, rig_hash, sensors, tick_s })
+        let hash = hexadecimal(&text, "pub const RIG_HASH: u64 = ");
+        match (hash, hexadecimal(&text, "crc: ").and_then(|crc| u32::try_from(crc).ok())) {
+            (Some(rig_hash), Some(crc)) => Ok(Self { path, rig_hash, crc }),
+            _ => Err(BuildError::NoGains { path }),
+        }
     }
 
     /// The file in `rigs/` that it is made from; none if it is made from another.
@@ -46,10 +42,10 @@ impl CommittedGains {
     }
 }
 
-/// The value of a constant in this source.
-fn constant<'a>(text: &'a str, name: &str) -> Option<&'a str> {
-    let line = text.lines().find_map(|line| line.strip_prefix("pub const ")?.strip_prefix(name))?;
-    line.strip_prefix(": ")?.split_once(" = ")?.1.strip_suffix(';')
+/// The number after `before` at the beginning of a line.
+fn hexadecimal(text: &str, before: &str) -> Option<u64> {
+    let number = text.lines().find_map(|line| line.trim_start().strip_prefix(before)?.strip_prefix("0x"))?;
+    u64::from_str_radix(&number.trim_end_matches([';', ',']).replace('_', ""), 16).ok()
 }
 
 #[cfg(test)]
@@ -60,8 +56,9 @@ mod tests {
     fn the_committed_table_is_the_one_of_a_rig_in_the_repository() {
         let gains = CommittedGains::read().unwrap();
         let rig = Rig::from_path(&gains.rig().unwrap()).unwrap();
-        assert_eq!((gains.sensors, gains.tick_s), (rig.sensors().len(), rig.tick.period_s));
+        assert_eq!(gains.rig_hash, rig.hash());
         assert_eq!(CommittedGains { rig_hash: 1, ..gains }.rig(), None);
-        assert_eq!(constant("pub const SENSORS: usize = 5;", "TICK_S"), None);
+        assert_eq!(hexadecimal("    crc: 0xcdc3_d964,", "crc: "), Some(0xcdc3_d964));
+        assert_eq!(hexadecimal("crc: 12", "crc: "), None);
     }
 }

@@ -10,9 +10,9 @@ use upright_design::table::TableValues;
 use super::error::{BuildError, MOST_PERCENT};
 
 /// Longest tick of a Pico in cycles while a rig of one to four links balances or rests, as measured in the emulator.
-pub const PICO_BALANCING_CYCLES: [u32; 4] = [15_000, 21_000, 27_000, 34_000];
+pub const PICO_BALANCING_CYCLES: [u32; 4] = [15_000, 21_000, 27_000, 34_500];
 /// The same while it follows a motion.
-pub const PICO_MOTION_CYCLES: [u32; 4] = [29_500, 44_000, 60_000, 83_000];
+pub const PICO_MOTION_CYCLES: [u32; 4] = [30_000, 44_000, 60_000, 83_000];
 
 /// Checks what the board can do for this rig, as far as that is known before it is designed.
 ///

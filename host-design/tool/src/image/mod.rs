@@ -1,4 +1,5 @@
-//! Images for the microcontroller: built with the compiler that is installed, and examined for size, stack and panics.
+//! Images for the microcontroller: code, compiled once for rigs of a kind, with the tables of a rig written behind it;
+//! and what they need and must not contain: size, stack, panics.
 //!
 //! ```
 //! use upright::boards::named;
@@ -20,11 +21,12 @@ mod kept;
 mod limits;
 mod size;
 mod stack;
+mod tables;
 mod uf2;
 mod usual;
 mod virtual_board;
 
-pub use build::{BuiltImage, PROFILE, build, build_for, usual_duration};
+pub use build::{BuiltImage, PROFILE, build_for, usual_duration};
 pub use checksum::{file_hash, flash_checksum};
 pub use compiler::{Compiler, compiler, compiler_for_chips};
 pub(crate) use compiler::{ForeignTarget, compiler_for};

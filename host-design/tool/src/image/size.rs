@@ -6,9 +6,11 @@ use upright_board::{Lines, LinesError};
 
 use super::elf::{Item, LinkedImage, LinkedSection};
 
-/// Name of the gain table: its values are in flash, and are copied to RAM at start-up.
+/// Name of the gain table in RAM.
 const TABLE: &str = "upright_image::app::__rtic_internal_local_init_table";
 
+/// The section of the tables in flash, from which the one in RAM is filled.
+pub(super) const TABLES: &str = ".tables";
 /// The section of constants.
 const CONSTANTS: &str = ".rodata";
 /// The section of variables with an initial value.
@@ -19,11 +21,13 @@ const VARIABLES: &str = ".data";
 pub struct Size {
     /// Flash in all, including the initial values of variables.
     pub flash: u32,
-    /// Constants in flash, among them the motions.
+    /// Constants in flash.
     pub constants: u32,
+    /// Gain table and motions in flash.
+    pub tables: u32,
     /// Static RAM: all variables, without the stack.
     pub ram: u32,
-    /// The gain table, which takes this much in flash and again in RAM; 0 if it is among the constants.
+    /// The gain table in RAM.
     pub table: u32,
     /// Code and constants that run from RAM, in flash and again in RAM.
     pub copied: u32,
@@ -34,9 +38,9 @@ pub struct Size {
 }
 
 impl Size {
-    /// Flash without the gain table and without constants.
+    /// Flash without tables and without constants.
     pub fn code(&self) -> u32 {
-        self.flash - self.table - self.constants
+        self.flash - self.tables - self.constants
     }
 
     /// Static RAM without the gain table, and without what is copied there.
@@ -87,10 +91,9 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
     let mut table = 0;
     for item in &image.data {
         let share = shares.entry(crate_of_symbol(item)).or_default();
-        // Initial values of other variables than the table are few: they are left to the unnamed rest.
+        // Initial values of variables are few: they are left to the unnamed rest.
         if item.name == TABLE {
             table = item.size;
-            share.flash += item.size;
         }
         let Some(section) = image.section_at(item.address) else { continue };
         share.ram += if section.in_ram { item.size } else { 0 };
@@ -104,10 +107,11 @@ pub fn size(image: &LinkedImage) -> Result<Size, SizeError> {
     let mut crates: Vec<ImagePart> =
         shares.into_iter().map(|(name, part)| ImagePart { name, ..part }).collect();
     crates.sort_by_key(|part| std::cmp::Reverse((part.flash, part.ram)));
-    let constants = sections.iter().filter(|part| part.name == CONSTANTS).map(|part| part.flash).sum();
+    let flash_of = |name| sections.iter().filter(|part| part.name == name).map(|part| part.flash).sum();
+    let (constants, tables) = (flash_of(CONSTANTS), flash_of(TABLES));
     let copied =
         image.sections.iter().filter(|section| is_copied(section)).map(|section| section.bytes).sum();
-    Ok(Size { flash, constants, ram, table, copied, sections, crates })
+    Ok(Size { flash, constants, tables, ram, table, copied, sections, crates })
 }
 
 /// Bytes of machine code by the crate of their source line.

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use upright::boards::BoardRow;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_tool::image::{BuildError, build, build_for};
+use upright_tool::image::{BuildError, build_for};
 
 pub(crate) use upright_test_support::equipment::{is_required, not_exercised};
+use upright_test_support::published::rig_and_table;
 
 /// What was built or found; `None` if it needs the missing compiler for the image. `what` it is for.
 pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Option<T> {
@@ -15,9 +16,10 @@ pub(crate) fn if_possible<T>(result: Result<T, BuildError>, what: &str) -> Optio
     upright_test_support::equipment::if_possible(result, is_missing, what)
 }
 
-/// The image with the committed gain table.
+/// The image for the rig of the committed gain table.
 pub(crate) fn built(board: &'static BoardRow) -> Option<PathBuf> {
-    if_possible(build(board), "an image").map(|image| image.elf)
+    let (rig, table) = rig_and_table("quadruple-paper");
+    built_for(board, rig, table)
 }
 
 /// The image with this table.

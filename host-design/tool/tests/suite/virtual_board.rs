@@ -16,7 +16,7 @@ use upright_design::simulate::Scenario;
 use upright_design::table::{Gains, TableValues};
 use upright_plan::{hangs, up_and_down};
 use upright_tool::campaign::{Class, Defect, During, Setup, one};
-use upright_tool::image::{build, conditions};
+use upright_tool::image::{build_for, conditions};
 use upright_tool::in_the_loop::{RunPlace, VirtualBoard, measure, run_compared};
 
 use crate::equipment::{built, built_for};
@@ -186,7 +186,8 @@ fn the_feather_balances_a_link_with_the_bits_of_the_host_and_refuses_another_chi
     assert_eq!(fault_of(&Conditions { crystal, ..own }), Some(Fault::Clock));
 
     // A rig with more encoders than the board counts.
-    let error = build(named("feather-f405").unwrap()).unwrap_err().to_string();
+    let (rig, table) = rig_and_table("quadruple-paper");
+    let error = build_for(named("feather-f405").unwrap(), rig, table).unwrap_err().to_string();
     assert_eq!(
         error,
         "feather-f405 counts 2 encoders, and this rig has 5: use another board (`upright firmware boards`)"

@@ -1,10 +1,13 @@
-//! The board of this image.
+//! The board of this image, which the environment variable UPRIGHT_BOARD names.
 
 use upright::boards::f4::{F4Board, F4Chip};
 use upright::boards::{Family, named};
 
-/// The board that the environment variable UPRIGHT_BOARD names.
-pub(super) const BOARD: F4Board = match named(env!("UPRIGHT_BOARD")) {
+/// The board's name.
+pub(super) const NAME: &str = env!("UPRIGHT_BOARD");
+
+/// The board.
+pub(super) const BOARD: F4Board = match named(NAME) {
     Some(row) => match &row.family {
         Family::F4(board) => *board,
         Family::Rp(_) => panic!("UPRIGHT_BOARD: the image for this board is boards/rp2040"),

@@ -1,21 +1,17 @@
 //! Memory that nobody writes, checked while the processor has nothing else to do.
 
-use upright::flash_image::{REFERENCE, WordSums};
+use upright::flash_image::{ImageTables, REFERENCE, WordSums};
 use upright::gains::{SENSORS, STATES};
 use upright::table::GainTable;
 
-/// Ticks from one check to the next: 8 ms, if a tick is shorter. A check empties the caches of the flash, so the tick
+use super::chosen::NAME;
+
+/// Time from one check to the next (s), if a tick is shorter. A check empties the caches of the flash, so the tick
 /// after it takes longer.
-const TICKS_PER_CHECK: u32 = {
-    let ticks = super::CLOCK_HZ / 125 / crate::CYCLES_PER_TICK;
-    if ticks > 1 { ticks } else { 1 }
-};
-/// Checks in which all of the image is read, whatever its size: 0.1 s. A bit that changes just behind the reader is
-/// found at the end of the next pass, so within 0.2 s.
-const CHECKS_PER_PASS: usize = {
-    let checks = super::CLOCK_HZ / 10 / (TICKS_PER_CHECK * crate::CYCLES_PER_TICK);
-    if checks > 1 { checks as usize } else { 1 }
-};
+const CHECK_S: f32 = 8e-3;
+/// Time in which all of the image is read, whatever its size (s). A bit that changes just behind the reader is found at
+/// the end of the next pass, so within twice this time.
+const PASS_S: f32 = 0.1;
 
 unsafe extern "C" {
     static __sdata: u32;
@@ -23,15 +19,30 @@ unsafe extern "C" {
     static __sidata: u32;
 }
 
-/// The image in flash: from its start to the end of the initial values of variables, which come last.
+const FLASH: usize = 0x0800_0000;
+/// The smallest flash of the chips.
+const FLASH_END: usize = FLASH + 512 * 1024;
+
+/// The words of flash from `begin` to `end`.
+fn flash(begin: usize, end: usize) -> &'static [u32] {
+    // SAFETY: within the flash, which nothing writes.
+    unsafe { core::slice::from_raw_parts(begin as *const u32, end.saturating_sub(begin) / 4) }
+}
+
+/// Where the code ends: behind the initial values of variables, which come last.
+fn code_end() -> usize {
+    let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
+    (&raw const __sidata) as usize + values
+}
+
+/// The tables of the rig, behind the code.
+pub(crate) fn tables() -> ImageTables<'static> {
+    ImageTables::at(flash(code_end(), FLASH_END), NAME, [STATES, SENSORS])
+}
+
+/// The image in flash: code and tables.
 pub(super) fn words() -> &'static [u32] {
-    const FLASH: usize = 0x0800_0000;
-    // SAFETY: symbols of the linker, of which only the addresses are used, and the image's own memory.
-    unsafe {
-        let values = (&raw const __edata) as usize - (&raw const __sdata) as usize;
-        let end = (&raw const __sidata) as usize + values;
-        core::slice::from_raw_parts(FLASH as *const u32, (end - FLASH) / 4)
-    }
+    flash(FLASH, code_end() + size_of_val(tables().words))
 }
 
 /// The checksum of the image as it is now.
@@ -50,9 +61,12 @@ fn add(sums: &mut WordSums, words: &[u32]) {
 
 /// Checks the gain table in RAM and the image in flash again and again.
 pub(crate) struct MemoryCheck {
-    table: &'static GainTable<STATES, SENSORS>,
-    /// WordSums of the image at the start.
+    tables: [&'static GainTable<STATES, SENSORS>; 2],
+    /// Sums of the image at the start.
     reference: WordSums,
+    /// Ticks from one check to the next, and words of the image that it reads.
+    ticks_per_check: u32,
+    words_per_check: usize,
     /// Interrupts until the next check, one of them in each tick.
     wait: u32,
     /// Words of the image that have been read, and their sums.
@@ -61,36 +75,42 @@ pub(crate) struct MemoryCheck {
 }
 
 impl MemoryCheck {
-    /// The check of this table, and of the image as it is now.
-    pub(super) fn new(table: &'static GainTable<STATES, SENSORS>) -> Self {
+    /// The check of a table and its copy, and of the image as it is now.
+    pub(super) fn new(tables: [&'static GainTable<STATES, SENSORS>; 2], tick_s: f32) -> Self {
         let mut reference = WordSums::default();
         add(&mut reference, words());
-        Self { table, reference, wait: TICKS_PER_CHECK, read: 0, sums: WordSums::default() }
+        let ticks_per_check = ((CHECK_S / tick_s) as u32).max(1);
+        let checks_per_pass = ((PASS_S / (ticks_per_check as f32 * tick_s)) as usize).max(1);
+        Self {
+            tables,
+            reference,
+            ticks_per_check,
+            words_per_check: words().len().div_ceil(checks_per_pass),
+            wait: ticks_per_check,
+            read: 0,
+            sums: WordSums::default(),
+        }
     }
 
-    /// To be called after each interrupt. If it is time, compares all of the table with its initial values in flash,
-    /// and reads the next part of the image. Returns where a bit has changed: the address of the table's word, or of
-    /// the end of the image.
+    /// To be called after each interrupt. If it is time, compares all of the table with its copy, and reads the next
+    /// part of the image. Returns where a bit has changed: the address of the table's word, or of the end of the image.
     pub(crate) fn advance(&mut self) -> Option<u32> {
         self.wait -= 1;
         if self.wait > 0 {
             return None;
         }
-        self.wait = TICKS_PER_CHECK;
-        let table = core::ptr::from_ref(self.table).cast::<u32>();
-        for word in 0..size_of_val(self.table) / 4 {
-            // SAFETY: within the table, and within its initial values, which lie in flash as the variables do in RAM.
-            // Volatile, because the compiler knows that nobody writes the table.
+        self.wait = self.ticks_per_check;
+        let [table, copy] = self.tables.map(|table| core::ptr::from_ref(table).cast::<u32>());
+        for word in 0..size_of::<GainTable<STATES, SENSORS>>() / 4 {
+            // SAFETY: within the tables. Volatile, because the compiler knows that nobody writes them.
             unsafe {
-                let at = table.add(word);
-                let initial = (&raw const __sidata).byte_add(at as usize - (&raw const __sdata) as usize);
-                if at.read_volatile() != initial.read_volatile() {
-                    return Some(at as u32);
+                if table.add(word).read_volatile() != copy.add(word).read_volatile() {
+                    return Some(table.add(word) as u32);
                 }
             }
         }
         let rest = words().get(self.read..).unwrap_or_default();
-        let part = rest.get(..words().len().div_ceil(CHECKS_PER_PASS)).unwrap_or(rest);
+        let part = rest.get(..self.words_per_check).unwrap_or(rest);
         add(&mut self.sums, part);
         self.read += part.len();
         if part.len() < rest.len() {

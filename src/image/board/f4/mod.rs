@@ -29,7 +29,7 @@ use upright::table::GainTable;
 use angles::Angles;
 pub(crate) use clock::CLOCK_HZ;
 use clock::Clock;
-pub(crate) use memory::MemoryCheck;
+pub(crate) use memory::{MemoryCheck, tables};
 use motor::{GIVES_PULSES, Motor};
 use sensors::{ANY_IS_ABSOLUTE, ANY_IS_ON_BUS, WIPER_BITS, WIPER_WIRE};
 pub(crate) use serial::{DmaBuffer, DmaLine};
@@ -50,6 +50,7 @@ pub(crate) struct F4Hardware {
     exti: EXTI,
     power: PWR,
     watchdog: Watchdog,
+    tick_s: f32,
     clock_fault: bool,
     wrong_chip: bool,
     image_is_damaged: bool,
@@ -58,17 +59,21 @@ pub(crate) struct F4Hardware {
     limits: [bool; 2],
 }
 
-/// Sets up all peripherals but the watchdog, with the motor off. Takes at most 300 ms, even if a peripheral does not
-/// respond. Also returns the check of memory, and what the board knows about the start.
+/// Sets up all peripherals but the watchdog, for ticks of so many processor cycles, with the motor off. Takes at most
+/// 300 ms, even if a peripheral does not respond.
+///
+/// Also returns the check of memory, and what the board knows about the start.
 pub(crate) fn set_up(
     device: Peripherals,
     buffer: &'static mut DmaBuffer,
-    table: &'static GainTable<STATES, SENSORS>,
+    tables: [&'static GainTable<STATES, SENSORS>; 2],
+    tick_cycles: u32,
 ) -> (F4Hardware, DmaLine, MemoryCheck, Start) {
+    let tick_s = tick_cycles as f32 / CLOCK_HZ as f32;
     let rcc = &device.RCC;
     clock::enable_peripherals(rcc);
     pins::set_up(&device.SYSCFG, &device.EXTI);
-    let motor = Motor::set_up(device.TIM1);
+    let motor = Motor::set_up(device.TIM1, tick_cycles);
     let (has_crashed, crash) = crash::take();
     let reset = clock::reset_reason(rcc, has_crashed);
     let clock = clock::set_up(rcc, &device.FLASH, &device.TIM11);
@@ -88,17 +93,18 @@ pub(crate) fn set_up(
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     // In this order: what changes in between is found by the check.
-    let memory = MemoryCheck::new(table);
+    let memory = MemoryCheck::new(tables, tick_s);
     let image = memory::of_image();
     let hardware = F4Hardware {
         motor,
-        steps: [const { Steps::new() }; GIVES_PULSES as usize],
+        steps: core::array::from_fn(|_| Steps::new(tick_cycles)),
         angles,
         bad: core::array::from_fn(|_| BadSamples::default()),
         supply,
         exti: device.EXTI,
         power: device.PWR,
-        watchdog: Watchdog::new(device.IWDG),
+        watchdog: Watchdog::new(device.IWDG, tick_s),
+        tick_s,
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
         image_is_damaged: image != WordSums::carried_by(memory::words()),
@@ -171,7 +177,7 @@ impl Board<SENSORS> for F4Hardware {
     }
 
     fn tick_s(&self) -> f32 {
-        crate::CYCLES_PER_TICK as f32 / CLOCK_HZ as f32
+        self.tick_s
     }
 
     fn drive(&mut self, output: &Output) {

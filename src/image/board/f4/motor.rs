@@ -15,12 +15,12 @@
 
 use crate::pac::TIM1;
 use upright::board::Output;
+use upright::boards::f4::TICK_US;
 use upright::boards::wiring::{Signal, wire_of};
 use upright::gains::TABLE;
 
 use super::chosen::BOARD;
 use super::pins;
-use crate::CYCLES_PER_TICK;
 
 /// Whether the drive of the gain table takes pulses, which `steps.rs` gives in place of the PWM.
 pub(super) const GIVES_PULSES: bool = TABLE.drive.pulses().is_some();
@@ -28,32 +28,53 @@ pub(super) const GIVES_PULSES: bool = TABLE.drive.pulses().is_some();
 /// Approximate PWM frequency (Hz): above hearing.
 const PWM_HZ: u32 = 20_000;
 
-/// PWM periods per tick. Three ticks of them fit into the 8-bit repetition counter.
-const PERIODS_PER_TICK: u32 = {
-    let wanted = CYCLES_PER_TICK / (super::CLOCK_HZ / PWM_HZ);
-    if wanted == 0 {
-        1
-    } else if wanted > 85 {
-        85
-    } else {
-        wanted
-    }
-};
-/// Timer clocks per PWM period.
-const PERIOD: u32 = CYCLES_PER_TICK / PERIODS_PER_TICK;
-const _: () = assert!(PERIOD <= 65_535, "the longest tick is too long for this timer");
-/// PWM periods until the motor is off after ticks stop.
-const PERIODS: u32 = 3 * PERIODS_PER_TICK;
-/// Shortest inactive time of the output in each period (timer clocks): power stages with a bootstrap supply need the
-/// pause, and none can follow a pause of nanoseconds. The duty is at most 98 %.
-const LEAST_PAUSE: u32 = PERIOD / 50;
-/// Counter wanted at a restart: the output is inactive there up to a duty of three quarters. Above it, a restart
-/// interrupts a pulse for about `RESTART`, 0.12 µs.
-const WANTED_PHASE: u32 = PERIOD / 5;
 /// Timer clocks from reading the counter to starting it again, about.
 const RESTART: u32 = 20;
-/// Largest change of the phase in a tick (timer clocks), more than the restart's time is off by.
-const LARGEST_SHIFT: u32 = PERIOD / 128;
+
+/// The PWM in ticks of a certain length.
+#[derive(Clone, Copy)]
+struct Pwm {
+    /// Timer clocks per PWM period.
+    period: u32,
+    /// PWM periods until the motor is off after ticks stop: those of three ticks, which fit into the 8-bit repetition
+    /// counter.
+    periods: u32,
+}
+
+impl Pwm {
+    /// In ticks of so many processor cycles, of which the longest gives a period that fits into the timer's 16 bits.
+    const fn of(tick_cycles: u32) -> Self {
+        let wanted = tick_cycles / (super::CLOCK_HZ / PWM_HZ);
+        let per_tick = match wanted {
+            0 => 1,
+            1..=85 => wanted,
+            _ => 85,
+        };
+        Self { period: tick_cycles / per_tick, periods: 3 * per_tick }
+    }
+
+    /// Shortest inactive time of the output in each period (timer clocks): power stages with a bootstrap supply need
+    /// the pause, and none can follow a pause of nanoseconds. The duty is at most 98 %.
+    fn least_pause(self) -> u32 {
+        self.period / 50
+    }
+
+    /// Counter wanted at a restart: the output is inactive there up to a duty of three quarters. Above it, a restart
+    /// interrupts a pulse for about `RESTART`, 0.12 µs.
+    fn wanted_phase(self) -> u32 {
+        self.period / 5
+    }
+
+    /// Largest change of the phase in a tick (timer clocks), more than the restart's time is off by.
+    fn largest_shift(self) -> u32 {
+        self.period / 128
+    }
+}
+
+const _: () = {
+    let longest = (super::CLOCK_HZ as u64 * TICK_US[1] as u64 / 1_000_000) as u32;
+    assert!(Pwm::of(longest).period <= 65_535, "the longest tick is too long for this timer");
+};
 
 /// OC1M = 111, PWM mode 2; OC1PE: compare values change with a restart, not within a period (17.4.7).
 const MODE: u32 = 0b111 << 4 | 1 << 3;
@@ -71,22 +92,24 @@ const MAIN_OUTPUT: u32 = 1 << 15;
 /// Timer 1 and the pins of the power stage.
 pub(super) struct Motor {
     pub(super) timer: TIM1,
+    pwm: Pwm,
     on: bool,
     failed: bool,
 }
 
 impl Motor {
-    /// Sets up the timer with the motor off.
-    pub(super) fn set_up(timer: TIM1) -> Self {
+    /// Sets up the timer with the motor off, for ticks of so many processor cycles.
+    pub(super) fn set_up(timer: TIM1, tick_cycles: u32) -> Self {
+        let pwm = Pwm::of(tick_cycles);
         // SAFETY, here and below: values within the widths of the fields.
-        timer.arr().write(|w| unsafe { w.bits(PERIOD - 1) });
-        timer.ccr1().write(|w| unsafe { w.bits(PERIOD) });
-        timer.rcr().write(|w| unsafe { w.bits(PERIODS - 1) });
+        timer.arr().write(|w| unsafe { w.bits(pwm.period - 1) });
+        timer.ccr1().write(|w| unsafe { w.bits(pwm.period) });
+        timer.rcr().write(|w| unsafe { w.bits(pwm.periods - 1) });
         timer.ccmr1_output().write(|w| unsafe { w.bits(MODE) });
         timer.ccer().write(|w| unsafe { w.bits(OUTPUT) });
         timer.bdtr().write(|w| unsafe { w.bits(PROTECTION) });
-        let failed = !is_set_up(&timer);
-        Self { timer, on: false, failed }
+        let failed = !is_set_up(&timer, pwm);
+        Self { timer, pwm, on: false, failed }
     }
 
     /// Whether the timer once did not hold what was written to it; the motor then stays off.
@@ -99,7 +122,8 @@ impl Motor {
     pub(super) fn may_drive(&mut self, wanted: bool) -> bool {
         if wanted && !self.on {
             // Pulses change what is loaded.
-            self.failed |= !if GIVES_PULSES { is_routed(&self.timer) } else { is_set_up(&self.timer) };
+            self.failed |=
+                !if GIVES_PULSES { is_routed(&self.timer) } else { is_set_up(&self.timer, self.pwm) };
         }
         if !wanted || self.failed {
             off(&self.timer);
@@ -130,18 +154,21 @@ impl Motor {
         if !self.may_drive(output.enable) {
             return;
         }
-        let active = (output.duty.abs() * PERIOD as f32 + 0.5) as u32;
-        self.timer.ccr1().write(|w| unsafe { w.bits(PERIOD - active.min(PERIOD - LEAST_PAUSE)) });
-        let phase = if self.on { self.timer.cnt().read().bits() } else { WANTED_PHASE };
+        let Pwm { period, .. } = self.pwm;
+        let (wanted, shift) = (self.pwm.wanted_phase(), self.pwm.largest_shift());
+        let active = (output.duty.abs() * period as f32 + 0.5) as u32;
+        let compare = period - active.min(period - self.pwm.least_pause());
+        self.timer.ccr1().write(|w| unsafe { w.bits(compare) });
+        let phase = if self.on { self.timer.cnt().read().bits() } else { wanted };
         // Not `clamp`, which can panic.
-        let nearer = WANTED_PHASE.max(phase.saturating_sub(LARGEST_SHIFT)).min(phase + LARGEST_SHIFT);
+        let nearer = wanted.max(phase.saturating_sub(shift)).min(phase + shift);
         // The update loads the compare value and the repetition counter and sets the counter to 0 (17.4.6: UG), where
         // the output is inactive: a safe moment to change the direction.
         self.timer.egr().write(|w| w.ug().set_bit());
         pins::push_along_x(output.duty > 0.0);
         // Never beyond the period: the counter would run on to the end of its range, with the output active.
         let phase = nearer + RESTART;
-        let phase = if phase < PERIOD { phase } else { 0 };
+        let phase = if phase < period { phase } else { 0 };
         self.timer.cnt().write(|w| unsafe { w.bits(phase) });
         // In one-pulse mode the update may have stopped the timer.
         self.timer.cr1().write(|w| w.opm().set_bit().cen().set_bit());
@@ -173,8 +200,10 @@ impl Motor {
 
 /// Whether the timer holds what was written to it. A write can be lost: a period of 65 536 clocks instead would mean
 /// full force for any duty.
-fn is_set_up(timer: &TIM1) -> bool {
-    timer.arr().read().bits() == PERIOD - 1 && timer.rcr().read().bits() == PERIODS - 1 && is_routed(timer)
+fn is_set_up(timer: &TIM1, pwm: Pwm) -> bool {
+    timer.arr().read().bits() == pwm.period - 1
+        && timer.rcr().read().bits() == pwm.periods - 1
+        && is_routed(timer)
 }
 
 /// Whether mode, output and protection are those that were written.

@@ -9,45 +9,28 @@
 //! drive off.
 
 use upright::board::Output;
-use upright::boards::PULSES_HZ;
 use upright::boards::f4::PULSES;
-use upright::gains::TABLE;
 
 use super::motor::Motor;
 use super::pins;
-use crate::CYCLES_PER_TICK;
 
-/// Processor cycles between the end of the pulses and the next start: a fiftieth of the tick, but no less than the time
-/// of a tick's code before its start, so that the pulses belong to one tick.
-const REST: u32 = {
-    let least = super::CLOCK_HZ / 1_000_000 * 20;
-    if CYCLES_PER_TICK / 50 > least { CYCLES_PER_TICK / 50 } else { least }
-};
-/// Processor cycles for the pulses of a tick; timer 1 counts at the same rate.
-const CYCLES: u32 = CYCLES_PER_TICK - REST;
-
-const _: () = {
-    if let Some(steps) = TABLE.drive.pulses() {
-        let rate = steps.speed_limit_m_per_s / steps.step_m;
-        let tick_s = CYCLES_PER_TICK as f32 / super::CLOCK_HZ as f32;
-        // Positions are rounded, so a tick may have a pulse more than its speed needs.
-        assert!(
-            rate <= PULSES_HZ && rate * tick_s <= (PULSES - 1) as f32,
-            "actuator.step_rate_limit_hz: the board gives fewer pulses"
-        );
-    }
-};
+/// Least number of processor cycles between the end of the pulses and the next start: the time of a tick's code before
+/// its start, so that the pulses belong to one tick. In long ticks it is a fiftieth of the tick.
+const LEAST_REST: u32 = super::CLOCK_HZ / 1_000_000 * 20;
 
 /// The number of pulses so far.
 pub(super) struct Steps {
+    /// Processor cycles for the pulses of a tick; timer 1 counts at the same rate.
+    cycles: u32,
     given: u32,
     was_late: bool,
 }
 
 impl Steps {
-    /// No pulses yet.
-    pub(super) const fn new() -> Self {
-        Self { given: 0, was_late: false }
+    /// No pulses yet, in ticks of so many processor cycles.
+    pub(super) fn new(tick_cycles: u32) -> Self {
+        let cycles = tick_cycles - LEAST_REST.max(tick_cycles / 50);
+        Self { cycles, given: 0, was_late: false }
     }
 
     /// Number of all pulses so far, with those of the last tick.
@@ -69,7 +52,7 @@ impl Steps {
         }
         let pulses = output.pulses();
         let number = pulses.unsigned_abs().min(PULSES);
-        if let Some(interval) = CYCLES.checked_div(number) {
+        if let Some(interval) = self.cycles.checked_div(number) {
             self.given = self.given.wrapping_add(if pulses > 0 { number } else { number.wrapping_neg() });
             let divider = interval >> 16;
             let clocks = interval / (divider + 1);

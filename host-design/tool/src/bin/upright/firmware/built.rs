@@ -5,36 +5,38 @@ use std::path::Path;
 use upright::boards::BoardRow;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, BuiltImage, CommittedGains};
+use upright_tool::image::{self, BuildError, BuiltImage, CommittedGains};
 
 use crate::building::building;
 use crate::variation::{Wanted, with_stored_motions, with_table};
 use upright_command::Failure;
 
-/// An image, and the rig and table that it is built from; none if it has src/gains.rs and that is made from no rig in
-/// `rigs/`.
+/// An image, and the rig and table that it is built from.
 pub(super) struct ForRig {
     pub(super) image: BuiltImage,
-    pub(super) design: Option<(Rig, TableValues)>,
+    pub(super) rig: Rig,
+    pub(super) table: TableValues,
 }
 
-/// Builds the image with the table of the rig and its stored motions, or with src/gains.rs as it is.
+/// Builds the image with the table of the rig and its stored motions, or with src/gains.rs, which has none.
 pub(super) fn built(board: &'static BoardRow, rig: Option<&Path>, wanted: Wanted) -> Result<ForRig, Failure> {
-    if let Some(path) = rig {
-        let (rig, table) = designed_for(board, path, wanted)?;
-        let image = building(board, || image::build_for(board, &rig, &table))?;
-        return Ok(ForRig { image, design: Some((rig, table)) });
-    }
-    let design = match CommittedGains::read()?.rig() {
-        // src/gains.rs has no motions.
-        Some(path) => Some(designed_for(board, &path, Wanted::Nothing)?),
-        None => None,
+    let (rig, table) = match rig {
+        Some(path) => designed_for(board, path, wanted)?,
+        None => committed(board)?,
     };
-    if let Some((_, table)) = &design {
-        image::check_table(board, table)?;
+    let image = building(board, || image::build_for(board, &rig, &table))?;
+    Ok(ForRig { image, rig, table })
+}
+
+/// The rig that src/gains.rs is made from, and its table, which has to be the same.
+fn committed(board: &'static BoardRow) -> Result<(Rig, TableValues), Failure> {
+    let gains = CommittedGains::read()?;
+    let Some(path) = gains.rig() else { return Err(BuildError::NoRig { path: gains.path }.into()) };
+    let (rig, table) = designed_for(board, &path, Wanted::Nothing)?;
+    if table.crc() != gains.crc {
+        return Err(BuildError::OtherGains { path: gains.path, rig: path }.into());
     }
-    let image = building(board, || image::build(board))?;
-    Ok(ForRig { image, design })
+    Ok((rig, table))
 }
 
 /// The same as [`designed`], for a board that can run the rig as far as that is known before.

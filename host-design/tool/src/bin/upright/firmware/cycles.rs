@@ -103,15 +103,9 @@ const CHECKED_S: f64 = 0.5;
 /// that its ticks cannot be measured. Only the virtual board measures: a Pico's ticks are known from its emulator.
 pub(super) fn check_ticks(board: &'static BoardRow, built: &ForRig) -> Result<(), Failure> {
     let Ok(conditions) = conditions(board, 1) else { return Ok(()) };
-    let Some((rig, table)) = &built.design else {
-        eprintln!(
-            "the ticks are not checked: the rig of src/gains.rs is not in rigs/; check them with `upright firmware \
-             cycles RIG`"
-        );
-        return Ok(());
-    };
+    let ForRig { rig, table, image } = built;
     let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
-    let cycles = measured(rig, table, &read(&built.image.elf)?, &conditions, law, CHECKED_S)?;
+    let cycles = measured(rig, table, &read(&image.elf)?, &conditions, law, CHECKED_S)?;
     let Span { cycles: longest, us } = cycles.all.whole;
     eprintln!(
         "the longest of {} ticks takes {us:.1} µs ({longest} cycles, approximately), {:.1} % of its period",

@@ -52,6 +52,7 @@ impl SizeCommand {
             "image": path,
             "flash": size.flash,
             "ram": size.ram,
+            "tables": size.tables,
             "table": size.table,
             "constants": size.constants,
             "copied": size.copied,
