@@ -4,6 +4,8 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use upright_design::number::significant;
+use upright_design::plant::ChainParameters;
 use upright_design::rig::{Rig, key_table};
 
 use crate::failure::Failure;
@@ -30,6 +32,18 @@ pub struct CheckCommand {
     keys: bool,
 }
 
+/// The speed that an arm must not reach while its links hang.
+fn turning_limit(rig: &Rig) -> String {
+    let parameters = rig.chain().map(ChainParameters::<f64>::of);
+    match parameters.and_then(|parameters| parameters.unstable_hanging_rad_per_s()) {
+        Some(speed) => format!(
+            "\nthe links hang unstably while the arm turns faster than {} rad/s; stay below half of that\n",
+            significant(speed, 3)
+        ),
+        None => String::new(),
+    }
+}
+
 impl CheckCommand {
     /// Runs the command.
     ///
@@ -41,6 +55,6 @@ impl CheckCommand {
         };
         let rig = Rig::from_path(&file)?;
         warn_of_unusual_values(&rig, &file);
-        print(self.json, &rig, || rig.describe())
+        print(self.json, &rig, || rig.describe() + &turning_limit(&rig))
     }
 }

@@ -34,8 +34,7 @@ pub fn warn_of_an_arm(rig: &Rig) {
     if rig.may_be_an_arm() {
         eprintln!(
             "warning: the rail is shorter than one turn of the pulley: if the cart is an arm that turns about a vertical \
-             axis, no motion far from upright fits it, because the plant has no centrifugal force (\"A rotary base\" in \
-             docs/other-machines.md)"
+             axis, describe it by [arm]: no motion far from upright fits a cart, which has no centrifugal force"
         );
     }
 }

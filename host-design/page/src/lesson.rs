@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use upright::table::Law;
-use upright_design::rig::{PlantDescription, Rig};
+use upright_design::rig::{CartOnly, PlantDescription, Rig};
 use upright_design::simulate::{Scenario, simulate};
 
 use crate::designed::DeskDesign;
@@ -115,6 +115,7 @@ fn numbers<const N: usize>(answer: &[f64]) -> Result<[f64; N], PageRefusal> {
 /// The run with the gains of the answer, in the firmware's own controller.
 fn gains(toml: &str, answer: &[f64], lean_rad: f64) -> Result<(bool, String), PageRefusal> {
     let rig = Rig::from_toml(toml, Path::new(FILE))?;
+    rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
     if answer.len() != rig.states() {
         return Err(PageRefusal::Answer(rig.states()));
     }

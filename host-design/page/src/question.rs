@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use upright_design::export::c_header;
-use upright_design::rig::{Rig, RigText};
+use upright_design::rig::{CartOnly, Rig, RigText};
 use upright_design::table::gains_source;
 
 use crate::changes::{changed, differences};
@@ -82,6 +82,7 @@ impl Desk {
 
     fn answered(&mut self, question: &Question) -> Result<Value, PageRefusal> {
         let rig = Rig::from_toml(&question.toml, Path::new(FILE))?;
+        rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
         let motions = question.motions.as_deref();
         match &question.wanted {
             Asked::Check => Ok(sketch(&rig, &RigText::parse(&question.toml, Path::new(FILE))?)),

@@ -143,7 +143,7 @@ fn relaxed(
     for factor in FACTORS {
         let mut remedy = Remedy::unchanged(rig);
         let changed = limits.iter().filter(|limit| limit.relax(&mut remedy, longest_s, factor).is_some());
-        let named = changed.map(|limit| limit.name(rig.actuator.input()));
+        let named = changed.map(|limit| limit.name(rig));
         let Some(name) = named.reduce(|first, _| first) else { return Ok(None) };
         let outcome = RelaxedSearch::run(&remedy.rig, transition, tried)?;
         done();

@@ -3,13 +3,12 @@
 use super::dynamics::Dynamics;
 use upright_design::number::rounded;
 use upright_design::numerics::Matrix;
-use upright_design::rig::CartInput;
 
 /// Bounds of a trajectory. Each holds at every knot.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bounds {
-    /// What the drive imposes on the cart.
-    pub(crate) kind: CartInput,
+    /// Name of what the drive imposes.
+    pub(crate) name: &'static str,
     /// Largest force (N) or acceleration (m/s²).
     pub(crate) input: f64,
     /// Force of the motor at standstill (N) and its loss by back-EMF (N·s/m): `|u + loss ẋ| <= force`.
@@ -46,7 +45,7 @@ impl Bounds {
         let free = PlanLimit { position: 0.0, speed: 0.0, input: 0.0, bound: 0.0, name: "" };
         let mut limits = Vec::new();
         for sign in [1.0, -1.0] {
-            limits.push(PlanLimit { input: sign, bound: self.input, name: self.kind.name(), ..free });
+            limits.push(PlanLimit { input: sign, bound: self.input, name: self.name, ..free });
             if let Some([stall, loss]) = self.motor {
                 limits.push(PlanLimit {
                     input: sign,
@@ -72,7 +71,7 @@ impl Bounds {
     #[must_use]
     pub(crate) fn scaled(&self, factor: f64) -> Self {
         Self {
-            kind: self.kind,
+            name: self.name,
             input: self.input * factor,
             motor: self.motor.map(|[stall, loss]| [stall * factor, loss]),
             speed_m_per_s: self.speed_m_per_s.map(|speed| speed * factor),

@@ -1,7 +1,7 @@
 //! Changes of the rig file that relax one limit of the plans.
 
 use upright_design::number::rounded;
-use upright_design::rig::{CartInput, PlantDescription, Rig};
+use upright_design::rig::{PlantDescription, Rig};
 
 /// Significant digits of an advised number. It is tried as it is printed.
 const DIGITS: usize = 3;
@@ -18,11 +18,11 @@ pub(crate) enum RigLimit {
 impl RigLimit {
     pub(crate) const ALL: [Self; 4] = [Self::Rail, Self::Input, Self::Speed, Self::Duration];
 
-    /// Name of the limit for a user whose drive imposes `input`.
-    pub(crate) fn name(self, input: CartInput) -> &'static str {
+    /// Name of the limit for the user of `rig`.
+    pub(crate) fn name(self, rig: &Rig) -> &'static str {
         match self {
             Self::Rail => "rail",
-            Self::Input => input.name(),
+            Self::Input => rig.input_quantity().name,
             Self::Speed => "speed of the cart",
             Self::Duration => "duration",
         }
@@ -56,7 +56,7 @@ impl Remedy {
 
     /// The changed keys with their new values.
     pub(crate) fn text(&self) -> String {
-        self.keys.join(" and ")
+        self.rig.words(&self.keys.join(" and "))
     }
 
     /// Allows `factor` times as much rail in a plan: raises what `[swing_up]` allows, and lengthens the rail if it is

@@ -121,7 +121,7 @@ impl<'a> Setting<'a> {
         }
         Ok(Self {
             actuator: Bounds {
-                kind: chain.input,
+                name: rig.input_quantity().name,
                 input,
                 motor: rig.actuator.motor().map(motor),
                 speed_m_per_s: rig.actuator.largest_speed_m_per_s(tick_s),

@@ -176,7 +176,8 @@ mod tests {
     fn partial_derivatives_agree_with_differences() {
         let rig = Rig::from_path(Path::new("../../rigs/triple-glueck-eder-kugi.toml")).unwrap();
         let cart = rig.chain().unwrap().clone();
-        let mut arm = Chain { base: Base::Arm { radius_m: 0.3 }, ..cart.clone() };
+        let mut arm = Chain { base: Base::Arm, ..cart.clone() };
+        arm.links.iter_mut().for_each(|link| link.radius_m = 0.3);
         arm.links[1].axial_inertia_kg_m2 = 1e-3;
         let moved = Chain { input: CartInput::Acceleration, ..arm.clone() };
         [cart, arm, moved].iter().for_each(agree_with_differences);

@@ -1,6 +1,6 @@
 //! The constants of a chain's equations of motion.
 
-use crate::numerics::{Matrix, Real};
+use crate::numerics::{Matrix, Real, eigenvalues};
 use crate::rig::{self, CartInput};
 
 /// The constants of the equations of motion in `x, φ` for n links.
@@ -115,6 +115,15 @@ impl<R: Real> ChainParameters<R> {
                 .map(|link| R::from_f64(link.friction_n_m_s_per_rad))
                 .collect(),
         }
+    }
+
+    /// Speed of an arm (rad/s) above which its hanging links leave the vertical, the least with
+    /// `det(diag(weight) - α̇² β) = 0`; none on a cart, whose links hang at any speed.
+    pub fn unstable_hanging_rad_per_s(&self) -> Option<f64> {
+        let (beta, n) = (self.turning.as_ref()?, self.links());
+        let scaled = Matrix::from_fn(n, n, |j, k| beta[(j, k)].to_f64() / self.weight[j].to_f64());
+        let largest = eigenvalues(&scaled).ok()?.iter().map(|value| value.re).fold(0.0, f64::max);
+        Some(1.0 / largest.sqrt())
     }
 
     /// Number of links, n.

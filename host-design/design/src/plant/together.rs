@@ -284,7 +284,8 @@ mod tests {
     fn every_kind_of_vector_that_this_processor_has_gives_the_bits_of_the_plant() {
         let rig = Rig::from_path(Path::new("../../rigs/quadruple-paper.toml")).unwrap();
         let cart = rig.chain().unwrap();
-        let arm = Chain { base: Base::Arm { radius_m: 0.1 }, ..cart.clone() };
+        let mut arm = Chain { base: Base::Arm, ..cart.clone() };
+        arm.links.iter_mut().for_each(|link| link.radius_m = 0.1);
         let moved = Chain { input: CartInput::Acceleration, ..arm.clone() };
         // Arms and carts in one vector, too.
         let chain = |lane: usize| {

@@ -1,6 +1,6 @@
 //! Machines with one imperfection alone.
 
-use crate::rig::{IMPERFECTIONS, Imperfection, PerJoint, Reality, Rig};
+use crate::rig::{IMPERFECTIONS, Imperfection, PerJoint, Reality, Rig, VERIFY};
 
 impl Imperfection {
     /// The machine of `rig` with this imperfection alone, of this size; a lag is that beyond the stated one.
@@ -11,7 +11,8 @@ impl Imperfection {
     /// The same with this angle over which joint friction builds up (rad), or the default.
     pub fn on_with_bristle(&self, rig: &Rig, size: f64, bristle_rad: Option<f64>) -> Rig {
         // The motor behind the pulses is a part of the drive.
-        let mut reality = Reality { step_motor: rig.reality.step_motor.clone(), ..Reality::default() };
+        let none = Reality::default().on(rig.base());
+        let mut reality = Reality { step_motor: rig.reality.step_motor.clone(), ..none };
         if let Some(bristle_rad) = bristle_rad {
             reality.friction.presliding_rad = PerJoint::all(bristle_rad);
         }
@@ -42,6 +43,9 @@ impl Imperfection {
 
     /// Why this imperfection is not simulated on the machine of `rig`, if it is not.
     pub fn not_on(&self, rig: &Rig) -> Option<&'static str> {
+        if !rig.base().has(&VERIFY, self.key) {
+            return Some("is of a rail");
+        }
         self.not_with(&rig.actuator, &rig.reality)
     }
 }

@@ -7,12 +7,14 @@ use std::fmt::Display;
 
 use crate::number::significant;
 
+use super::base::Base;
 use super::key::{Absent, Key, Section};
 use super::sections::actuator::ACTUATOR;
 use super::sections::chain::{CART, GRAVITY};
 use super::sections::friction::FRICTION;
 use super::sections::imperfections::REQUIRED_SIZES;
 use super::sections::integral::INTEGRAL;
+use super::sections::kalman::KALMAN;
 use super::sections::limits::LIMITS;
 use super::sections::link::LINK;
 use super::sections::reality::REALITY;
@@ -33,7 +35,7 @@ impl Rig {
     /// marked `(default)`.
     pub fn describe(&self) -> String {
         let is_acceleration = self.actuator.held().is_motion();
-        let mut page = Description { is_acceleration, ..Description::default() };
+        let mut page = Description { is_acceleration, base: self.base(), ..Description::default() };
         page.heading(&self.name);
         page.note("hash", &format!("{:016x}", self.hash()));
         match &self.plant {
@@ -46,7 +48,8 @@ impl Rig {
         page.design(self);
         page.section(&LIMITS, &self.limits);
         page.section(&VERIFY, &self.verify);
-        for key in REQUIRED_SIZES {
+        let base = page.base;
+        for key in REQUIRED_SIZES.iter().filter(|key| base.has(&VERIFY, key.name)) {
             let size = self.must_survive.iter().find(|(imperfection, _)| imperfection.key == key.name);
             page.row(&VERIFY, key, size.map(|&(_, size)| size).as_slice());
         }
@@ -88,6 +91,8 @@ struct Description {
     text: String,
     /// Whether the drive imposes the cart's acceleration.
     is_acceleration: bool,
+    /// What carries the links.
+    base: Base,
 }
 
 impl Description {
@@ -103,23 +108,31 @@ impl Description {
     }
 
     /// A section of scalars under its heading.
-    fn section<T: Keys>(&mut self, section: &Section, values: &T) {
-        self.heading(section.name.replace('_', " "));
+    fn section<T: Keys>(&mut self, section: &'static Section, values: &T) {
+        self.heading(self.base.name("", section.name).replace('_', " "));
         self.rows(section, values);
     }
 
-    fn rows<T: Keys>(&mut self, section: &Section, values: &T) {
-        for (key, numbers) in T::KEYS.iter().zip(values.values()) {
+    fn rows<T: Keys>(&mut self, section: &'static Section, values: &T) {
+        let (rows, base) = (T::KEYS.iter().zip(values.values()), self.base);
+        for (key, numbers) in rows.filter(|(key, _)| base.has(section, key.name)) {
             self.row(section, key, &numbers);
         }
     }
 
     /// A key with its numbers or, if it has none, with the default that applies.
-    fn row(&mut self, section: &Section, key: &Key, numbers: &[f64]) {
+    fn row(&mut self, section: &'static Section, key: &Key, numbers: &[f64]) {
+        let key = &self.base.key(section, key.name);
         let label = match key.label() {
             label if label.is_empty() => section.name.to_owned(),
             // Only their units tell `stribeck_rad_per_s` and `stribeck_m_per_s` apart.
-            label if section.keys().filter(|other| other.label() == label).count() > 1 => {
+            label
+                if section
+                    .keys()
+                    .filter(|other| self.base.key(section, other.name).label() == label)
+                    .count()
+                    > 1 =>
+            {
                 key.name.replace('_', " ")
             }
             label => label,
@@ -132,7 +145,7 @@ impl Description {
             // A key that this rig does not have.
             [] if matches!(key.absent, Absent::Required | Absent::RequiredIf(_)) => {}
             [] => {
-                let text = key.absent.to_string();
+                let text = self.base.words(&key.absent.to_string());
                 // The text after the semicolon is for other rigs.
                 self.list(&label, text.split(';').take(1).map(str::to_owned), DEFAULT);
             }
@@ -184,10 +197,18 @@ impl Description {
         let n = chain.links.len();
         let length: f64 = chain.links.iter().map(|link| link.length_m).sum();
         let links_kg = chain.links_mass_kg();
-        self.value("links on a cart", n as f64, "", "");
+        self.value(
+            &format!("links on a{} {}", if self.base.is_cart() { "" } else { "n" }, self.base.noun()),
+            n as f64,
+            "",
+            "",
+        );
         self.value("states", (2 * n + 2) as f64, "", "");
         match chain.cart.mass_kg {
-            Some(cart_kg) => self.value("total mass", cart_kg + links_kg, "kg", ""),
+            Some(_) => {
+                let mass = self.base.mass();
+                self.value(&format!("total {}", mass.name), chain.total_mass_kg(), mass.unit, "");
+            }
             None => self.value("mass of the links", links_kg, "kg", ""),
         }
         self.value("total length", length, "m", "");
@@ -209,6 +230,10 @@ impl Description {
         self.value("centre of mass from joint", centre, "m", mark(link.centre_of_mass_m.is_none()));
         self.value("inertia about it", inertia, "kg·m²", mark(link.inertia_kg_m2.is_none()));
         self.row(&LINK, given("friction_n_m_s_per_rad"), &[link.friction_n_m_s_per_rad]);
+        if !self.base.is_cart() {
+            self.row(&LINK, given("radius_m"), &[link.radius_m]);
+            self.row(&LINK, given("axial_inertia_kg_m2"), &[link.axial_inertia_kg_m2]);
+        }
         match link.encoder {
             Some(LinkEncoder::StepRad(step)) => self.value("encoder step", step, "rad", ""),
             Some(LinkEncoder::CountsPerRev(counts)) => {
@@ -276,13 +301,16 @@ impl Description {
 
     fn motor(&mut self, motor: &Motor) {
         self.rows(&ACTUATOR, motor);
-        self.value("force at standstill", motor.stall_force_n(), "N", "(largest)");
-        self.value("speed without load", motor.supply_v / motor.volts_per_speed(), "m/s", "(largest)");
-        self.value("braking by back-EMF", motor.braking_n_s_per_m(), "N·s/m", "");
+        let (force, base) = (self.base.force(), self.base);
+        let at_standstill = format!("{} at standstill", force.name);
+        self.value(&at_standstill, motor.stall_force_n(), force.unit, "(largest)");
+        let without_load = motor.supply_v / motor.volts_per_speed();
+        self.value("speed without load", without_load, base.speed().unit, "(largest)");
+        self.value("braking by back-EMF", motor.braking_n_s_per_m(), base.damping().unit, "");
     }
 
     fn reality(&mut self, reality: &Reality) {
-        if *reality == Reality::default() {
+        if *reality == Reality::default().on(self.base) {
             return;
         }
         self.section(&REALITY, &reality.friction);
@@ -303,8 +331,8 @@ impl Description {
         if !lqr.cross_weights.is_empty() {
             self.numbers("cross weights", &lqr.cross_weights, "");
         }
-        let weight = if self.is_acceleration { "acceleration weight" } else { "force weight" };
-        self.value(weight, lqr.force_weight, "", "");
+        let weight = if self.is_acceleration { "acceleration_weight" } else { "force_weight" };
+        self.value(&self.base.name("lqr", weight).replace('_', " "), lqr.force_weight, "", "");
         if lqr.angles_are_absolute {
             self.line("angles", "absolute", "", "");
         }
@@ -332,11 +360,12 @@ impl Description {
         }
         if let Some(KalmanNoise { force_noise_n2_s, joint_noise, observer_poles }) = &rig.kalman {
             self.heading("kalman");
-            let (name, unit) = match self.is_acceleration {
-                false => ("force noise intensity", "N²·s"),
-                true => ("acceleration noise intensity", "m²/s³"),
+            let noise = match self.is_acceleration {
+                false => "force_noise_n2_s",
+                true => "acceleration_noise_m2_per_s3",
             };
-            self.value(name, *force_noise_n2_s, unit, "");
+            let key = self.base.key(&KALMAN, noise);
+            self.value(&format!("{} intensity", key.label()), *force_noise_n2_s, key.unit, "");
             self.numbers("joint noise intensities", joint_noise, "(N·m)²·s");
             if !observer_poles.is_empty() {
                 self.list("observer poles", observer_poles.iter().map(pole), "1/s");

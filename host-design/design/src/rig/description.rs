@@ -4,7 +4,9 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use upright::table::Law;
 
+use super::base::Base;
 use super::defaults;
+use super::quantity::Quantity;
 use super::sections::actuator::Actuator;
 use super::sections::chain::{Chain, PlantDescription};
 use super::sections::friction::KnownFriction;
@@ -61,6 +63,32 @@ pub struct Rig {
 }
 
 impl Rig {
+    /// What carries the links; a model has the words of a cart.
+    pub fn base(&self) -> Base {
+        self.chain().map_or(Base::Cart, |chain| chain.base)
+    }
+
+    /// A text about a cart, for what carries the links of this rig.
+    pub fn words(&self, text: &str) -> String {
+        self.base().words(text)
+    }
+
+    /// What moves the plant.
+    pub fn input_quantity(&self) -> Quantity {
+        match &self.plant {
+            PlantDescription::Chain(chain) => chain.input.quantity(chain.base),
+            PlantDescription::Model(_) => Quantity::OF_MODEL,
+        }
+    }
+
+    /// What follows the set-point.
+    pub fn output_quantity(&self) -> Quantity {
+        match &self.plant {
+            PlantDescription::Chain(chain) => chain.base.position(),
+            PlantDescription::Model(_) => Quantity { name: "output", unit: "" },
+        }
+    }
+
     /// The soft limits of its rail, low and high, where the motor is turned off (m).
     pub fn soft_rail_m(&self, chain: &Chain) -> [f64; 2] {
         let [low, high] = chain.cart.travel_m;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use toml_edit::{DocumentMut, Item, Table, Value};
 
+use super::base::Base;
 use super::error::{RigError, RigErrorKind};
 use super::node::RigSource;
 
@@ -22,6 +23,8 @@ use super::node::RigSource;
 #[derive(Debug, Clone)]
 pub struct RigText {
     document: DocumentMut,
+    /// What carries the links: keys are given as in a file with a cart, and written as in one with this base.
+    base: Base,
     file: PathBuf,
     /// Whether lines end with a carriage return and a line feed.
     has_crlf: bool,
@@ -33,13 +36,14 @@ impl RigText {
     /// # Errors
     /// [`RigError`] if the text is not TOML.
     pub fn parse(text: &str, file: &Path) -> Result<Self, RigError> {
-        let document = RigSource { file, text }.document()?.into_mut();
-        Ok(Self { document, file: file.to_owned(), has_crlf: text.contains("\r\n") })
+        let document = RigSource { file, text, base: Base::Cart }.document()?.into_mut();
+        let base = Base::of(&document);
+        Ok(Self { document, base, file: file.to_owned(), has_crlf: text.contains("\r\n") })
     }
 
     /// Whether the text gives `key`: `tick.period_s`, `link[2].mass_kg`, `lqr.state_weights[1]`.
     pub fn has(&self, key: &str) -> bool {
-        found(self.document.as_item(), key).is_some()
+        found(self.document.as_item(), &self.base.path(key)).is_some()
     }
 
     /// Every key of the text with its value as it is written, in the order of the text: `link[2].mass_kg`, `0.23`.
@@ -51,7 +55,7 @@ impl RigText {
 
     /// The number that the text gives `key`; none if it gives none.
     pub fn number(&self, key: &str) -> Option<f64> {
-        let item = found(self.document.as_item(), key)?;
+        let item = found(self.document.as_item(), &self.base.path(key))?;
         item.as_float().or_else(|| item.as_integer().map(|number| number as f64))
     }
 
@@ -60,6 +64,7 @@ impl RigText {
     /// # Errors
     /// [`RigError`] if there is no such entry of a list, or if `value` is not TOML.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), RigError> {
+        let key = &*self.base.path(key);
         let file = self.file.clone();
         let refused = |kind| RigError { key: Some(key.to_owned()), ..RigError::of_file(&file, kind) };
         let mut value: Value = value.parse().map_err(|error: toml_edit::TomlError| {
@@ -83,6 +88,7 @@ impl RigText {
 
     /// Takes `key` out, with the comment on its line. A key that is not there stays absent.
     pub fn remove(&mut self, key: &str) {
+        let key = &*self.base.path(key);
         let (parent, name) = key.rsplit_once('.').unwrap_or(("", key));
         let table = match parent {
             "" => Some(self.document.as_item_mut()),
@@ -158,8 +164,8 @@ fn place<'a>(document: &'a mut Item, key: &str) -> Option<&'a mut Item> {
 
 /// The offset at which `text` gives `key`; none if it does not, or is not TOML.
 pub(super) fn place_in(text: &str, key: &str) -> Option<usize> {
-    let document = RigSource { file: Path::new(""), text }.document().ok()?;
-    found(document.as_item(), key)?.span().map(|span| span.start)
+    let document = RigSource { file: Path::new(""), text, base: Base::Cart }.document().ok()?;
+    found(document.as_item(), &Base::of(&document).path(key))?.span().map(|span| span.start)
 }
 
 /// Adds what stands below `key` in `item`.

@@ -129,6 +129,15 @@ pub enum RigErrorKind {
         /// What to do.
         remedy: String,
     },
+    /// A part of the program is made for carts alone.
+    #[error(
+        "{part} takes [cart] alone; near upright, an arm of this length is a cart in other numbers: mass_kg and friction are \
+         those of the arm divided by radius_m², travel and encoder step are multiplied by it"
+    )]
+    CartOnly {
+        /// The part.
+        part: &'static str,
+    },
     /// Two keys or tables exclude each other.
     #[error("given together with {other}; {remedy}")]
     Conflict {
@@ -155,6 +164,25 @@ pub enum RigErrorKind {
         /// The pole to add.
         conjugate: String,
     },
+}
+
+impl RigErrorKind {
+    /// The same with other words in what is accepted and what to do.
+    pub(super) fn worded(mut self, words: &dyn Fn(&str) -> String) -> Self {
+        let texts = match &mut self {
+            Self::UnknownKey { accepts, .. } => vec![accepts],
+            Self::MissingKey { remedy } | Self::NotFinite { remedy, .. } | Self::Conflict { remedy, .. } => {
+                vec![remedy]
+            }
+            Self::WrongType { accepts, remedy, .. }
+            | Self::WrongLength { accepts, remedy, .. }
+            | Self::OutOfRange { accepts, remedy, .. }
+            | Self::PoleCount { accepts, remedy, .. } => vec![accepts, remedy],
+            _ => Vec::new(),
+        };
+        texts.into_iter().for_each(|text| *text = words(text));
+        self
+    }
 }
 
 impl RigError {

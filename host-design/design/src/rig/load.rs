@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use super::base::Base;
 use super::error::{MAX_BYTES, RigError, RigErrorKind};
 use super::node::RigSource;
 use super::{Rig, read};
@@ -20,7 +21,7 @@ impl Rig {
             Err(error) => {
                 let offset = error.valid_up_to();
                 let readable = String::from_utf8_lossy(&bytes[..offset]);
-                let source = RigSource { file, text: &readable };
+                let source = RigSource { file, text: &readable, base: Base::Cart };
                 Err(source.error(offset, None, RigErrorKind::NotUtf8 { offset }))
             }
         }
@@ -34,7 +35,7 @@ impl Rig {
         if text.len() as u64 > MAX_BYTES {
             return Err(RigError::of_file(file, RigErrorKind::TooLarge));
         }
-        read::rig(&RigSource { file, text })
+        read::rig(&RigSource { file, text, base: Base::Cart })
     }
 }
 

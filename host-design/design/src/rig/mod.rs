@@ -20,6 +20,7 @@
 //! ```
 
 mod base;
+mod cart_only;
 pub mod defaults;
 mod describe;
 mod description;
@@ -40,6 +41,7 @@ mod unusual;
 mod value;
 
 pub use base::Base;
+pub use cart_only::CartOnly;
 pub use description::Rig;
 pub use document::key_table;
 pub use edit::RigText;
@@ -66,6 +68,7 @@ pub use sections::reality::{
 pub use sections::robust::{ToleranceKey, Tolerances};
 pub use sections::swing_up::SwingUpRules;
 pub use sections::tick::Tick;
+pub(crate) use sections::verify::VERIFY;
 pub use sections::verify::{RequiredSize, Requirements};
 pub use sections::{SECTIONS, TOP};
 pub use sensors::{AbsoluteRange, Sensor};

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use toml_edit::{ArrayOfTables, Document, Item, TableLike, Value};
 
+use super::base::Base;
 use super::error::{Place, RigError, RigErrorKind};
-use super::key::Section;
+use super::key::{Key, Section};
 use super::rule::Rule;
 
 /// A rig file's text and name.
@@ -16,6 +17,8 @@ pub(super) struct RigSource<'a> {
     pub(super) file: &'a Path,
     /// Its text.
     pub(super) text: &'a str,
+    /// What carries the links of its machine, after which keys and messages are named.
+    pub(super) base: Base,
 }
 
 impl<'a> RigSource<'a> {
@@ -27,7 +30,8 @@ impl<'a> RigSource<'a> {
             line: before.iter().filter(|&&byte| byte == b'\n').count() + 1,
             column: String::from_utf8_lossy(&before[line_start..]).chars().count() + 1,
         };
-        RigError { file: self.file.to_owned(), place: Some(place), key, kind: Box::new(kind) }
+        let kind = Box::new(kind.worded(&|text| self.base.words(text)));
+        RigError { file: self.file.to_owned(), place: Some(place), key, kind }
     }
 
     /// Parses the document; an error says where it stops being TOML.
@@ -231,7 +235,7 @@ impl<'a> Node<'a> {
         };
         let table =
             Table { source: self.source, section, key: self.key.clone(), start: self.span.start, table };
-        table.only(&section.keys().map(|key| key.name).collect::<Vec<_>>())?;
+        table.only(&table.keys().map(|key| key.name).collect::<Vec<_>>())?;
         Ok(table)
     }
 }
@@ -261,7 +265,8 @@ impl<'a> Table<'a> {
         sections: &[&str],
     ) -> Result<Self, RigError> {
         let root = Table { source, section, key: String::new(), start: 0, table: document.as_table() };
-        let keys: Vec<_> = section.keys().map(|key| key.name).chain(sections.iter().copied()).collect();
+        let sections = sections.iter().map(|name| source.base.name(section.name, name));
+        let keys: Vec<_> = section.keys().map(|key| key.name).chain(sections).collect();
         root.only(&keys)?;
         Ok(root)
     }
@@ -286,8 +291,26 @@ impl<'a> Table<'a> {
         if self.key.is_empty() { name.to_owned() } else { format!("{}.{name}", self.key) }
     }
 
-    /// The value of a key, if given.
+    /// The keys that a file with its base has in this section.
+    fn keys(&self) -> impl Iterator<Item = Key> {
+        let (base, section) = (self.source.base, self.section);
+        let own = section.keys().filter(move |key| base.has(section, key.name));
+        own.map(move |key| base.key(section, key.name))
+    }
+
+    /// What carries the links of this file's machine.
+    pub(super) fn base(&self) -> Base {
+        self.source.base
+    }
+
+    /// The row of a key, for the base of this file.
+    pub(super) fn key(&self, name: &str) -> Key {
+        self.source.base.key(self.section, name)
+    }
+
+    /// The value of a key, if given. Keys are called as in a file with a cart.
     pub(super) fn get(&self, name: &str) -> Option<Node<'a>> {
+        let name = self.source.base.name(self.section.name, name);
         let (key, item) = self.table.get_key_value(name)?;
         let found = match item {
             Item::Table(table) => RigItem::Table(table),
@@ -302,13 +325,13 @@ impl<'a> Table<'a> {
 
     /// An error saying that a key is missing. `remedy` completes "add".
     pub(super) fn missing(&self, name: &str, remedy: &str) -> RigError {
-        let remedy = remedy.to_owned();
+        let (remedy, name) = (remedy.to_owned(), self.source.base.name(self.section.name, name));
         self.source.error(self.start, Some(self.full_key(name)), RigErrorKind::MissingKey { remedy })
     }
 
     /// What to give for a key: completes "give" and "add".
     pub(super) fn asks_for(&self, name: &str) -> String {
-        self.section.asks_for(self.section.key(name))
+        self.section.asks_for(&self.key(name))
     }
 
     /// The value of a key or section that must be given. `remedy` completes "add".

@@ -1,5 +1,6 @@
 //! Checks the text of a rig file and builds a [`Rig`] from it.
 
+use super::base::Base;
 use super::error::RigError;
 use super::key::Section;
 use super::node::{Node, RigSource, Table};
@@ -15,6 +16,8 @@ use crate::number::significant;
 /// Checks a whole rig file.
 pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let document = source.document()?;
+    let base = Base::of(&document);
+    let source = &RigSource { base, ..*source };
     let root = Table::root(source, &document, &TOP, &SECTIONS.map(|section| section.name))?;
     let name = name(&root)?;
     let given = |section: &Section| root.get(section.name);
@@ -25,7 +28,7 @@ pub(super) fn rig(source: &RigSource<'_>) -> Result<Rig, RigError> {
     let plant = chain::plant(&root, input)?;
     let states = plant.states();
     let reality = |node: Node<'_>| reality::reality(&node, &plant, tick.period_s, actuator.motor().is_some());
-    let reality = given(&reality::REALITY).map_or(Ok(Reality::default()), reality)?;
+    let reality = given(&reality::REALITY).map_or(Ok(Reality::default().on(base)), reality)?;
     let (verify, must_survive) = given(&verify::VERIFY)
         .map_or(Ok(Default::default()), |node| verify::verify(&node, &actuator, &reality))?;
     let rig = Rig {

@@ -1,13 +1,14 @@
 //! How far a machine that was built with care is from its file: what fault detection tolerates in any case.
 
 use super::Rig;
+use super::base::Base;
 use super::sections::chain::Chain;
 use super::sections::robust::Tolerances;
 
 /// Friction of a joint, as a share of the moment of the links' weight that it carries. Measured bearings have 0.06 to
 /// 0.3 %.
 const JOINT_SHARE: f64 = 0.003;
-/// Friction of the cart, as a share of the weight on the rail.
+/// Friction of the cart, as a share of the weight on the rail; of an arm, of the moment of its links' weight.
 const CART_SHARE: f64 = 0.05;
 /// Error of the masses (%).
 const MASS_PERCENT: f64 = 3.0;
@@ -24,10 +25,15 @@ impl Tolerances {
             least_n_m = f64::min(least_n_m, gravity * (own + outer_kg * link.length_m));
             outer_kg += link.mass_kg;
         }
+        // An arm's bearing carries the links beside it.
+        let carried = match chain.base {
+            Base::Cart => chain.cart.mass_kg.unwrap_or_default() + outer_kg,
+            Base::Arm => chain.links.iter().map(|link| link.mass_kg * link.radius_m).sum(),
+        };
         Self {
             mass_percent: MASS_PERCENT,
             joint_friction_n_m: JOINT_SHARE * least_n_m,
-            cart_friction_n: CART_SHARE * gravity * (chain.cart.mass_kg.unwrap_or_default() + outer_kg),
+            cart_friction_n: CART_SHARE * gravity * carried,
             homing_error_rad: JOINT_SHARE,
             latency_s: 0.0,
         }

@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
+use super::base::Base;
 use super::description::Rig;
 use super::edit::place_in;
 use super::key::Section;
@@ -16,38 +17,39 @@ use super::sections::tick::TICK;
 use super::value::Keys;
 use crate::number::significant;
 
-/// The smallest and the largest value that a rig on a bench has, by key. A key that may be 0 has 0 as its smallest.
-const USUAL: &[(&str, [f64; 2])] = &[
-    ("tick.period_s", [2e-5, 0.1]),
-    ("cart.mass_kg", [0.01, 100.0]),
-    ("cart.friction_n_s_per_m", [0.0, 200.0]),
-    ("cart.travel_m", [0.02, 20.0]),
-    ("cart.encoder_step_m", [1e-8, 5e-3]),
-    ("link.mass_kg", [1e-3, 50.0]),
-    ("link.length_m", [5e-3, 5.0]),
-    ("link.friction_n_m_s_per_rad", [0.0, 1.0]),
-    ("link.encoder_step_rad", [6e-7, 0.126]),
-    ("link.encoder_counts_per_rev", [50.0, 1e7]),
-    ("link.sensor_delay_s", [0.0, 0.1]),
-    ("actuator.force_limit_n", [0.05, 2000.0]),
-    ("actuator.driver_lag_s", [1e-6, 0.2]),
-    ("actuator.torque_constant_n_m_per_a", [1e-4, 5.0]),
-    ("actuator.back_emf_constant_v_s_per_rad", [1e-4, 5.0]),
-    ("actuator.resistance_ohm", [0.01, 500.0]),
-    ("actuator.gear_ratio", [0.05, 1000.0]),
-    ("actuator.pulley_radius_m", [1e-3, 0.5]),
-    ("actuator.supply_v", [1.0, 400.0]),
-    ("actuator.acceleration_limit_m_per_s2", [0.1, 500.0]),
-    ("actuator.step_m", [1e-8, 5e-3]),
-    ("actuator.speed_limit_m_per_s", [0.02, 50.0]),
-    ("actuator.step_rate_limit_hz", [100.0, 5e7]),
-    ("actuator.bandwidth_hz", [0.3, 1e4]),
-    ("limits.speed_m_per_s", [0.02, 50.0]),
-    ("limits.jog_force_n", [5e-3, 500.0]),
+/// The smallest and the largest value that a rig on a bench has, by key, and that of an arm in its own unit. A key that
+/// may be 0 has 0 as its smallest.
+const USUAL: &[(&str, [f64; 2], Option<[f64; 2]>)] = &[
+    ("tick.period_s", [2e-5, 0.1], None),
+    ("cart.mass_kg", [0.01, 100.0], Some([1e-6, 10.0])),
+    ("cart.friction_n_s_per_m", [0.0, 200.0], Some([0.0, 5.0])),
+    ("cart.travel_m", [0.02, 20.0], Some([0.1, 1e3])),
+    ("cart.encoder_step_m", [1e-8, 5e-3], Some([1e-6, 0.126])),
+    ("link.mass_kg", [1e-3, 50.0], None),
+    ("link.length_m", [5e-3, 5.0], None),
+    ("link.friction_n_m_s_per_rad", [0.0, 1.0], None),
+    ("link.encoder_step_rad", [6e-7, 0.126], None),
+    ("link.encoder_counts_per_rev", [50.0, 1e7], None),
+    ("link.sensor_delay_s", [0.0, 0.1], None),
+    ("actuator.force_limit_n", [0.05, 2000.0], Some([1e-3, 500.0])),
+    ("actuator.driver_lag_s", [1e-6, 0.2], None),
+    ("actuator.torque_constant_n_m_per_a", [1e-4, 5.0], None),
+    ("actuator.back_emf_constant_v_s_per_rad", [1e-4, 5.0], None),
+    ("actuator.resistance_ohm", [0.01, 500.0], None),
+    ("actuator.gear_ratio", [0.05, 1000.0], None),
+    ("actuator.pulley_radius_m", [1e-3, 0.5], None),
+    ("actuator.supply_v", [1.0, 400.0], None),
+    ("actuator.acceleration_limit_m_per_s2", [0.1, 500.0], Some([1.0, 1e4])),
+    ("actuator.step_m", [1e-8, 5e-3], Some([1e-6, 0.1])),
+    ("actuator.speed_limit_m_per_s", [0.02, 50.0], Some([0.1, 500.0])),
+    ("actuator.step_rate_limit_hz", [100.0, 5e7], None),
+    ("actuator.bandwidth_hz", [0.3, 1e4], None),
+    ("limits.speed_m_per_s", [0.02, 50.0], Some([0.1, 500.0])),
+    ("limits.jog_force_n", [5e-3, 500.0], Some([1e-4, 100.0])),
 ];
 
-/// What is usual for the speed of a cart whose motor has no load (m/s).
-const FREE_SPEED_M_PER_S: [f64; 2] = [0.05, 50.0];
+/// What is usual for the speed of a cart whose motor has no load (m/s), and of an arm (rad/s).
+const FREE_SPEED: [[f64; 2]; 2] = [[0.05, 50.0], [0.5, 2e3]];
 
 /// A value far from those of any bench. It is not an error. Displayed, it is a sentence; so it is in JSON.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +57,7 @@ pub struct UnusualValue {
     /// Its key: `link[1].mass_kg`.
     pub key: String,
     /// What it is, if it is not the value of the key.
-    what: Option<&'static str>,
+    what: Option<String>,
     value: f64,
     unit: &'static str,
     usual: [f64; 2],
@@ -93,7 +95,7 @@ impl Serialize for UnusualValue {
 impl Rig {
     /// Values far from those of any bench. None of them is an error.
     pub fn unusual_values(&self) -> Vec<UnusualValue> {
-        let mut found = UnusualValues::default();
+        let mut found = UnusualValues { base: self.base(), unusual: Vec::new() };
         if let Some(chain) = self.chain() {
             found.expect_all(&CART, &chain.cart);
             for (number, link) in (1..).zip(&chain.links) {
@@ -136,20 +138,21 @@ impl Rig {
         let pulley = self.actuator.motor().map(|motor| motor.pulley_radius_m);
         pulley.zip(self.chain()).is_some_and(|(radius_m, chain)| {
             let [low, high] = chain.cart.travel_m;
-            high - low < TAU * radius_m
+            chain.base.is_cart() && high - low < TAU * radius_m
         })
     }
 }
 
-#[derive(Default)]
 struct UnusualValues {
+    base: Base,
     unusual: Vec<UnusualValue>,
 }
 
 impl UnusualValues {
     /// Compares the numbers of a section with what is usual: of a pair, its length.
-    fn expect_all<T: Keys>(&mut self, section: &Section, values: &T) {
-        for (key, numbers) in T::KEYS.iter().zip(values.values()) {
+    fn expect_all<T: Keys>(&mut self, section: &'static Section, values: &T) {
+        let (base, keys) = (self.base, T::KEYS.iter().zip(values.values()));
+        for (key, numbers) in keys.filter(|(key, _)| base.has(section, key.name)) {
             let value = match numbers[..] {
                 [value] => value,
                 [low, high] => high - low,
@@ -159,20 +162,23 @@ impl UnusualValues {
         }
     }
 
-    fn expect(&mut self, section: &Section, key: &str, name: &str, value: f64) {
-        let is_key = |known: &&(&str, _)| known.0.split_once('.') == Some((section.name, name));
-        let Some(&(_, usual)) = USUAL.iter().find(is_key) else { return };
-        let what = (name == "travel_m").then_some("length of cart.travel_m");
-        self.compare(UnusualValue { key: key.to_owned(), what, value, unit: section.key(name).unit, usual });
+    fn expect(&mut self, section: &'static Section, key: &str, name: &str, value: f64) {
+        let is_key = |known: &&(&str, _, _)| known.0.split_once('.') == Some((section.name, name));
+        let Some(&(_, of_cart, of_arm)) = USUAL.iter().find(is_key) else { return };
+        let (base, unit) = (self.base, self.base.key(section, name).unit);
+        let usual = if base.is_cart() { of_cart } else { of_arm.unwrap_or(of_cart) };
+        let what = (name == "travel_m").then(|| format!("length of {}", base.path("cart.travel_m")));
+        self.compare(UnusualValue { key: base.path(key), what, value, unit, usual });
     }
 
     fn expect_free_speed(&mut self, value: f64) {
+        let base = self.base;
         self.compare(UnusualValue {
             key: "actuator".to_owned(),
-            what: Some("speed of the cart without load, from [actuator],"),
+            what: Some(format!("speed of the {} without load, from [actuator],", base.noun())),
             value,
-            unit: "m/s",
-            usual: FREE_SPEED_M_PER_S,
+            unit: base.speed().unit,
+            usual: FREE_SPEED[usize::from(!base.is_cart())],
         });
     }
 
@@ -190,7 +196,7 @@ mod tests {
 
     #[test]
     fn every_usual_range_is_that_of_a_key() {
-        for (key, [low, high]) in USUAL {
+        for (key, [low, high], _) in USUAL {
             let (section, name) = key.split_once('.').unwrap();
             let sections = [&CART, &LINK, &ACTUATOR, &TICK, &LIMITS];
             let section = sections.into_iter().find(|known| known.name == section).unwrap();

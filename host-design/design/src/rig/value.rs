@@ -136,10 +136,12 @@ impl Value for [f64; 2] {
 impl Table<'_> {
     /// The value of a key, read according to its row.
     pub(super) fn value<V: Value>(&self, name: &str) -> Result<V, RigError> {
-        let key = self.section.key(name);
+        let key = self.key(name);
         match self.get(name) {
-            Some(node) => V::read(&node, key.rule, &self.section.asks_for(key)),
-            None => V::when_absent(key.absent).ok_or_else(|| self.missing(name, &self.section.asks_for(key))),
+            Some(node) => V::read(&node, key.rule, &self.section.asks_for(&key)),
+            None => {
+                V::when_absent(key.absent).ok_or_else(|| self.missing(name, &self.section.asks_for(&key)))
+            }
         }
     }
 }

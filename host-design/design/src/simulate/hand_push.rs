@@ -6,7 +6,7 @@ use crate::rig::Chain;
 /// A horizontal push: a force that is constant for a while.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandPush {
-    /// What is pushed: 0: the cart, 1: the first link …
+    /// What is pushed: 0: the cart, or the end of the arm; 1: the first link …
     pub body: usize,
     /// Where on the link: 0 at its joint, 1 at its end.
     pub along: f64,
@@ -22,8 +22,8 @@ pub struct HandPush {
 const SAME_S: f64 = 1e-9;
 
 impl HandPush {
-    /// The force on the cart (N) and the torques at the joints (N·m) in the tick that begins at `t` (s) in `state`;
-    /// none before and after the push.
+    /// The force on the cart (N), or the torque on the arm (N·m), and the torques at the joints (N·m) in the tick that
+    /// begins at `t` (s) in `state`; none before and after the push.
     pub fn in_tick(&self, t: f64, chain: &Chain, state: &[f64]) -> Option<(f64, Vec<f64>)> {
         let since = t - self.from_s;
         let pushes = since > -SAME_S && since < self.duration_s - SAME_S;
@@ -33,7 +33,9 @@ impl HandPush {
             _ => 0.0,
         };
         let arms_m = || chain.links.iter().map(|link| link.length_m).enumerate().map(arm).collect::<Vec<_>>();
-        pushes.then(|| (self.force_n, torques_of_force(&arms_m(), [self.force_n, 0.0], state)))
+        // On an arm, it turns the arm by the lever of the pushed link's plane.
+        let lever = chain.radius_m(self.body.saturating_sub(1)).unwrap_or(1.0);
+        pushes.then(|| (self.force_n * lever, torques_of_force(&arms_m(), [self.force_n, 0.0], state)))
     }
 }
 

@@ -9,7 +9,7 @@ use super::scenario::Scenario;
 use super::trace::Trace;
 use crate::number::significant;
 use crate::plant::absolute_angles;
-use crate::rig::{CartInput, PlantDescription, Quantity, Rig};
+use crate::rig::{Base, CartInput, PlantDescription, Quantity, Rig};
 
 /// Loss of balance, which ends a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -109,6 +109,9 @@ pub struct Summary {
     /// What the drive imposes on the cart.
     #[serde(skip_serializing_if = "CartInput::is_force")]
     pub input: CartInput,
+    /// What carries the links.
+    #[serde(skip_serializing_if = "Base::is_cart")]
+    pub base: Base,
     /// Largest absolute force on the cart (N), or acceleration of the cart (m/s²) where the drive imposes that.
     pub peak_force_n: f64,
     /// Largest absolute force or acceleration that the law requested.
@@ -170,6 +173,7 @@ impl Summary {
             undershoot_percent: percent(against),
             peak_angles_rad,
             input: rig.actuator.input(),
+            base: rig.base(),
             peak_force_n,
             peak_requested_force_n,
             final_error_m,
@@ -179,10 +183,17 @@ impl Summary {
     /// The fall, and what the motor has to do with it.
     pub fn fall_in_words(&self) -> Option<String> {
         let fall = self.fall.as_ref()?;
-        let Some(reach) = self.out_of_volts_m_per_s else { return Some(fall.to_string()) };
+        let fall = self.base.words(&fall.to_string());
+        let Some(reach) = self.out_of_volts_m_per_s else { return Some(fall) };
+        let (reach, pulley) = (
+            self.base.speed().of(&significant(reach, 3)),
+            match self.base {
+                Base::Cart => ", a larger pulley",
+                Base::Arm => "",
+            },
+        );
         Some(format!(
-            "{fall}: the motor has no voltage left at {} m/s (a smaller gear_ratio, a larger pulley or supply_v make it faster)",
-            significant(reach, 3)
+            "{fall}: the motor has no voltage left at {reach} (a smaller gear_ratio{pulley} or supply_v make it faster)"
         ))
     }
 
@@ -193,7 +204,7 @@ impl Summary {
 
     /// What moved the plant.
     pub fn input_quantity(&self) -> Quantity {
-        if self.is_of_model() { Quantity::OF_MODEL } else { self.input.quantity() }
+        if self.is_of_model() { Quantity::OF_MODEL } else { self.input.quantity(self.base) }
     }
 
     /// Whether the rig is still up at the end of the run.
@@ -215,11 +226,13 @@ impl fmt::Display for Summary {
         for (index, angle) in self.peak_angles_rad.iter().enumerate() {
             writeln!(f, "  peak theta{}    {:.4} rad ({:.2} deg)", index + 1, angle, angle.to_degrees())?;
         }
-        let (input, m) = (self.input_quantity(), if self.is_of_model() { "" } else { " m" });
+        let input = self.input_quantity();
+        let output = if self.is_of_model() { Quantity::OF_MODEL } else { self.base.position() };
         let [peak, requested] =
             [self.peak_force_n, self.peak_requested_force_n].map(|x| input.of(&format!("{x:.3}")));
         // As wide as "peak theta1".
-        writeln!(f, "  peak {:.5}     {peak} (requested: {requested})", input.name)?;
-        write!(f, "  final error    {:.2e}{m}", self.final_error_m)
+        let name = if input.name.len() > 6 { &input.name[..5] } else { input.name };
+        writeln!(f, "  peak {name:<9} {peak} (requested: {requested})")?;
+        write!(f, "  final error    {}", output.of(&format!("{:.2e}", self.final_error_m)))
     }
 }

@@ -90,7 +90,9 @@ fn write_source(out: &mut String, rig: &Rig, table: &TableValues) -> core::fmt::
 fn state_names(rig: &Rig) -> Vec<String> {
     match &rig.plant {
         PlantDescription::Chain(chain) => {
-            let cart = ["cart position (m)".to_owned(), "cart speed (m/s)".to_owned()];
+            let (noun, position, speed) = (chain.base.noun(), chain.base.position(), chain.base.speed());
+            let cart = [("position", position), ("speed", speed)]
+                .map(|(what, quantity)| format!("{noun} {what} ({})", quantity.unit));
             let links = (1..=chain.links.len()).flat_map(|link| {
                 [format!("angle of link {link} (rad)"), format!("angular rate of link {link} (rad/s)")]
             });

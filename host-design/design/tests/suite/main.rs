@@ -11,6 +11,7 @@ mod plant_rigs;
 mod plant_sines;
 mod public_machines;
 mod reality_friction;
+mod rig_arm;
 mod rig_errors;
 mod rig_files;
 

@@ -48,12 +48,12 @@ impl Case {
             of.inertia_kg_m2 = Some(link.inertia_kg_m2);
             of.axial_inertia_kg_m2 = link.axial_inertia_kg_m2;
             of.friction_n_m_s_per_rad = link.friction_n_m_s_per_rad;
-            of.radius_m = Some(link.radius_m);
+            of.radius_m = link.radius_m;
             of
         });
         let mut chain = chain(self.arm.inertia, links.collect());
         chain.cart.friction_n_s_per_m = self.arm.friction;
-        (chain.base, chain.input) = (Base::Arm { radius_m: 1.0 }, input);
+        (chain.base, chain.input) = (Base::Arm, input);
         chain
     }
 
@@ -86,7 +86,7 @@ fn accelerations_are_those_of_mujoco() {
         let mut thin = pushed.clone();
         thin.links[0].axial_inertia_kg_m2 = 0.0;
         let mut farther = pushed.clone();
-        farther.links[0].radius_m = Some(1.001 * case.links[0].radius_m);
+        farther.links[0].radius_m *= 1.001;
         let cart = Chain { base: Base::Cart, ..pushed.clone() };
         for other in [thin, farther, cart] {
             assert!(difference(&other) > 1e4 * TOLERANCE, "{:e}", difference(&other));
@@ -99,7 +99,12 @@ fn accelerations_are_those_of_mujoco() {
 fn a_very_long_arm_is_a_cart() {
     let cart = with_friction(unequal_rods(3), 1.0);
     let (radius_m, state) = (1e6, [0.3, -0.8, 2.0, 1.0, -0.7, 3.0, 0.4, -2.0]);
-    let mut arm = Chain { base: Base::Arm { radius_m }, ..cart.clone() };
+    let on_arm = |radius_m: f64| {
+        let mut arm = Chain { base: Base::Arm, ..cart.clone() };
+        arm.links.iter_mut().for_each(|link| link.radius_m = radius_m);
+        arm
+    };
+    let mut arm = on_arm(radius_m);
     arm.cart.mass_kg = cart.cart.mass_kg.map(|mass_kg| mass_kg * radius_m * radius_m);
     arm.cart.friction_n_s_per_m *= radius_m * radius_m;
     let rates = |chain: &Chain, scale: f64| {
@@ -115,7 +120,7 @@ fn a_very_long_arm_is_a_cart() {
         assert!((cart - arm).abs() < 1e-8 * (1.0 + cart.abs()), "{cart} {arm}");
     }
     // Negative control: an arm of half a metre is not.
-    let mut short = Chain { base: Base::Arm { radius_m: 0.5 }, ..cart.clone() };
+    let mut short = on_arm(0.5);
     short.cart.mass_kg = cart.cart.mass_kg.map(|mass_kg| 0.25 * mass_kg);
     assert!((rates(&short, 0.5)[1] - of_cart[1]).abs() > 1e-2);
 }

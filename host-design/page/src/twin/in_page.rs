@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use upright::table::Law;
 use upright_closed_loop::conversation::Monitor;
 use upright_closed_loop::harness::{HarnessError, endless_firmware};
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::connected::{ConnectedBoard, Exchange};
@@ -105,6 +105,7 @@ impl Twin {
         since_1970_s: f64,
     ) -> Result<Self, PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
+        rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
         let table = DeskDesign::design(&rig)?.table_with(&rig, motions)?;
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, law) };

@@ -19,6 +19,8 @@ pub(crate) struct PulledPoint {
 #[derive(Debug, Clone)]
 pub(crate) struct Spring {
     lengths_m: Vec<f64>,
+    /// Distances of the links' planes from an arm's axis (m); 1 on a cart, whose position is a length.
+    levers_m: Vec<f64>,
     masses_kg: Vec<f64>,
     total_kg: f64,
     gravity_m_per_s2: f64,
@@ -30,7 +32,7 @@ pub(crate) struct Spring {
 pub(crate) struct Pull {
     /// Along the rail, and up (N).
     pub(crate) force_n: [f64; 2],
-    /// The generalised force on the cart (N).
+    /// The generalised force on the cart (N), or on an arm (N·m).
     pub(crate) cart_n: f64,
     /// The torques at the joints (N·m).
     pub(crate) torques_n_m: Vec<f64>,
@@ -52,6 +54,7 @@ impl Spring {
     pub(crate) fn of(chain: &Chain, period_s: f64) -> Self {
         Self {
             lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
+            levers_m: (0..chain.links.len()).map(|link| chain.radius_m(link).unwrap_or(1.0)).collect(),
             total_kg: chain.total_mass_kg(),
             masses_kg: chain.links.iter().map(|link| link.mass_kg).collect(),
             gravity_m_per_s2: chain.gravity_m_per_s2,
@@ -79,7 +82,9 @@ impl Spring {
             _ => 0.0,
         };
         let arms_m: Vec<f64> = (0..angles.len()).map(arm).collect();
-        let (mut point, mut speed) = ([state[0], 0.0], [state[1], 0.0]);
+        let lever =
+            pulled.body.checked_sub(1).and_then(|link| self.levers_m.get(link)).copied().unwrap_or(1.0);
+        let (mut point, mut speed) = ([state[0] * lever, 0.0], [state[1] * lever, 0.0]);
         for (link, (&phi, &phidot)) in angles.iter().zip(&rates).enumerate() {
             let (sin, cos) = phi.sin_cos();
             let arm = arms_m[link];
@@ -87,7 +92,7 @@ impl Spring {
             speed = [speed[0] - arm * cos * phidot, speed[1] - arm * sin * phidot];
         }
         let force_n = self.force(pulled, point, speed);
-        Pull { force_n, cart_n: force_n[0], torques_n_m: torques_of_force(&arms_m, force_n, state) }
+        Pull { force_n, cart_n: force_n[0] * lever, torques_n_m: torques_of_force(&arms_m, force_n, state) }
     }
 
     /// The torques at the joints (N·m) of a force along the rail (N) at the end of the first link.
@@ -129,6 +134,7 @@ mod tests {
     fn spring(links: usize) -> Spring {
         Spring {
             lengths_m: vec![0.5; links],
+            levers_m: vec![1.0; links],
             masses_kg: vec![0.2; links],
             total_kg: 1.0,
             gravity_m_per_s2: 9.81,

@@ -102,6 +102,7 @@ fn row(
     let row = ComparedRow {
         rig: candidate.label.clone(),
         input: rig.actuator.input(),
+        base: rig.base(),
         value: candidate.value,
         law,
         fate: Fate::Survived,

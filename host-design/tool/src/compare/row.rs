@@ -3,7 +3,7 @@
 use serde::Serialize;
 use upright::table::Law;
 
-use upright_design::rig::CartInput;
+use upright_design::rig::{Base, CartInput};
 use upright_design::simulate::{Fall, Trace};
 
 /// Results for one law of one candidate.
@@ -13,6 +13,9 @@ pub struct ComparedRow {
     pub rig: String,
     /// What its drive imposes on the cart.
     pub input: CartInput,
+    /// What carries its links.
+    #[serde(skip_serializing_if = "Base::is_cart")]
+    pub base: Base,
     /// Value of the swept key; `None` without a sweep.
     pub value: Option<f64>,
     /// The control law that was run.
@@ -28,14 +31,14 @@ pub struct ComparedRow {
 
 /// What the drives of these rows impose on their carts, with its unit, as words.
 pub(super) fn input(rows: &[ComparedRow]) -> String {
-    let mut inputs: Vec<CartInput> = Vec::new();
+    let mut inputs: Vec<(Base, CartInput)> = Vec::new();
     for row in rows {
-        if !inputs.contains(&row.input) {
-            inputs.push(row.input);
+        if !inputs.contains(&(row.base, row.input)) {
+            inputs.push((row.base, row.input));
         }
     }
-    inputs.sort_by_key(|input| !input.is_force());
-    let titles: Vec<String> = inputs.into_iter().map(|input| input.quantity().title()).collect();
+    inputs.sort_by_key(|(_, input)| !input.is_force());
+    let titles: Vec<String> = inputs.into_iter().map(|(base, input)| input.quantity(base).title()).collect();
     titles.join(" or ")
 }
 

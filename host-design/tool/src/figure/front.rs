@@ -1,18 +1,17 @@
 //! The least ripple over multiples of the tolerances.
 
 use upright::table::Law;
-use upright_design::rig::CartInput;
+use upright_design::rig::Quantity;
 use upright_trust::robust::{Front, FrontPoint};
 
 use super::{Axis, Curve, Figure, Panel};
 
 /// One curve for each law. A multiple that no choice survives interrupts the lines.
-pub fn front_figure(front: &Front, input: CartInput, title: &str) -> Figure {
+pub fn front_figure(front: &Front, input: Quantity, title: &str) -> Figure {
     let ends = front.0.iter().map(|point| point.scale);
     let largest = ends.fold(0.0, f64::max);
     let x = Axis::linear("multiple of the tolerances").range(0.0, 1.05 * largest);
-    let name = input.name();
-    let y = Axis::linear(format!("predicted ripple of the {name} ({} rms)", input.unit()));
+    let y = Axis::linear(format!("predicted ripple of the {} ({} rms)", input.name, input.unit));
     let mut panel = Panel::new(x, y);
     for (number, law) in Law::ALL.into_iter().enumerate() {
         let ripple = |point: &FrontPoint| {

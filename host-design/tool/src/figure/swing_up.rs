@@ -1,7 +1,7 @@
 //! Margins along the motions of a swing-up, and the candidates of its search.
 
 use upright_design::motion::Transition;
-use upright_design::rig::CartInput;
+use upright_design::rig::Rig;
 use upright_plan::{Margin, RandomRuns, SolvedCandidate};
 
 use super::{Axis, Curve, Figure, Panel};
@@ -28,7 +28,7 @@ pub fn margins_figure(title: &str, motions: &[(Transition, Vec<Margin>)]) -> Fig
 
 /// Largest force or acceleration, use of the rail, random runs that arrive, and fragility over the duration, a point
 /// for each candidate.
-pub fn trade_figure(title: &str, solved: &[SolvedCandidate], input: CartInput) -> Figure {
+pub fn trade_figure(title: &str, solved: &[SolvedCandidate], rig: &Rig) -> Figure {
     let durations = solved.iter().map(|one| one.duration_s);
     let (shortest, longest) =
         (durations.clone().fold(f64::INFINITY, f64::min), durations.fold(0.0, f64::max));
@@ -53,8 +53,8 @@ pub fn trade_figure(title: &str, solved: &[SolvedCandidate], input: CartInput) -
             .with(Curve::markers("fewer", 0, points(false)))
     };
     Figure::new(title)
-        .with(panel(Axis::linear(format!("largest {} ({})", input.name(), input.unit())), |one| one.input))
-        .with(panel(Axis::linear("farthest (m)"), |one| one.position_m))
+        .with(panel(Axis::linear(format!("largest {}", rig.input_quantity().title())), |one| one.input))
+        .with(panel(Axis::linear(format!("farthest ({})", rig.output_quantity().unit)), |one| one.position_m))
         .with(
             Panel::new(duration(), Axis::linear("runs that arrive (%)").range(-5.0, 105.0))
                 .with(Curve::markers("with the errors of [swing_up]", 2, arrive(|one| &one.runs)))

@@ -118,7 +118,7 @@ impl<'a> ReportPage<'a> {
         let names = state_names(rig);
         let observer = design.kalman.as_ref().filter(|_| table.observer.is_some());
         let checks = check_rows(trust);
-        let input = rig.actuator.input();
+        let input = rig.input_quantity();
         let style = format!("{}{COLOURS_CSS}{}", style_sheet(), include_str!("page.css"));
         Ok(Self {
             name: &rig.name,
@@ -128,7 +128,7 @@ impl<'a> ReportPage<'a> {
             delay_ticks: rig.tick.delay_ticks,
             is_chain: rig.chain().is_some(),
             is_disturbed: Disturbance::of(rig) != Disturbance::NONE,
-            input: format!("{} u ({})", input.name(), input.unit()),
+            input: format!("{} u ({})", input.name, input.unit),
             failed: checks.iter().filter(|check| !check.holds).count(),
             checks,
             description: rig.describe(),

@@ -7,7 +7,7 @@ use upright_trust::verify::{FoundRow, TrustReport, rows};
 pub(super) struct TrustRow {
     pub(super) name: String,
     pub(super) values: Vec<String>,
-    pub(super) meaning: &'static str,
+    pub(super) meaning: String,
 }
 
 /// A requirement and what was found.
@@ -42,7 +42,7 @@ pub(super) fn trust_rows(rig: &Rig, report: &TrustReport) -> Vec<TrustRow> {
     let row = |named: &FoundRow| TrustRow {
         name: named.name.clone(),
         values: laws.iter().map(|rows| value(rows, &named.name)).collect(),
-        meaning: named.meaning,
+        meaning: named.meaning.clone(),
     };
     names.iter().map(row).collect()
 }

@@ -119,12 +119,12 @@ fn a_stepper_without_an_observer_shows_its_gains_and_asks_for_kalman() {
 #[test]
 fn a_cart_whose_rail_is_shorter_than_a_turn_of_its_pulley_may_be_an_arm() {
     let said = |path: &str| stderr(&upright(&["swing-up", path, "--stored"])).to_owned();
-    // The rotary base of the guide: an arm of 85 mm that turns by 80° to both sides.
-    let text = include_str!("../../../../docs/other-machines.md");
-    let rig = text.split_once("```toml\n").and_then(|(_, rest)| rest.split_once("```")).unwrap().0;
-    let (_folder, path) = written(rig);
-    assert!(said(&path).contains("A rotary base"), "{}", said(&path));
+    // An arm of 85 mm that turns by 80° to both sides, described as a cart.
+    let cart = std::fs::read_to_string(rig_path("single-quanser-ip02")).unwrap();
+    let arm = cart.replace("[-0.4, 0.4]", "[-0.12, 0.12]").replace("0.00635", "0.085");
+    let (_folder, path) = written(&arm);
+    assert!(said(&path).contains("describe it by [arm]"), "{}", said(&path));
     // Negative control: a rack with a pinion of 6 mm.
     let (_folder, path) = written(&std::fs::read_to_string(rig_path("single-quanser-ip02")).unwrap());
-    assert!(!said(&path).contains("rotary"), "{}", said(&path));
+    assert!(!said(&path).contains("[arm]"), "{}", said(&path));
 }

@@ -55,7 +55,7 @@ pub fn rewritten(
         text.set("verify.force_rms_n", &significant(disturbance.force_n, DIGITS))?;
     }
     set_tolerances(&mut text, tolerances)?;
-    Ok(format!("{}{text}", head(file, choice, rig.actuator.input().unit())))
+    Ok(format!("{}{text}", head(file, choice, rig.input_quantity().unit)))
 }
 
 /// Gives a rig file these tolerances as its `[robust]`; those that are 0 are left out.

@@ -136,7 +136,7 @@ pub struct FoundRow {
     /// What was found, with its unit.
     pub value: String,
     /// What the value means.
-    pub meaning: &'static str,
+    pub meaning: String,
 }
 
 /// One quantity of the trust report.
@@ -328,12 +328,12 @@ pub const QUANTITIES: &[TrustQuantity] = &[
         name: "force needed",
         meaning: "largest force that a stepper needed in those runs, with the cart's mass and friction, and its share of what \
                   the motor in `[reality]` has at that speed: stay below a half",
-        values: One(|_, law| {
+        values: One(|rig, law| {
             let found = law.noise_run.as_ref()?.ripple.as_ref()?;
             let share = found
                 .needed_share
                 .map_or(String::new(), |share| format!(", {} % of the motor's", number(1e2 * share)));
-            Some(format!("{} N{share}", number(found.needed_force_n?)))
+            Some(format!("{}{share}", rig.base().force().of(&number(found.needed_force_n?))))
         }),
     },
     TrustQuantity {
@@ -435,9 +435,9 @@ pub fn rows(rig: &Rig, law: &LawTrust) -> Vec<FoundRow> {
             Each(values) => values(rig, law),
         };
         values.into_iter().map(|(part, value)| FoundRow {
-            name: format!("{}{part}", quantity.name),
-            value,
-            meaning: quantity.meaning,
+            name: rig.words(&format!("{}{part}", quantity.name)),
+            value: rig.words(&value),
+            meaning: rig.words(quantity.meaning),
         })
     };
     QUANTITIES.iter().flat_map(rows_of).collect()
@@ -453,9 +453,9 @@ fn ripple(rig: &Rig, force_n: f64, states: &[f64]) -> String {
         return format!("input {}, output {}", number(force_n), number(states[rig.output()]));
     }
     let angles: Vec<String> = states.iter().skip(2).step_by(2).map(|&angle| number(1e3 * angle)).collect();
-    let cart_mm = number(1e3 * states[rig.output()]);
+    let (position, unit) = (number(1e3 * states[rig.output()]), rig.output_quantity().unit);
     format!(
-        "{} {}, cart {cart_mm} mm, angles {} mrad",
+        "{} {}, cart {position} m{unit}, angles {} mrad",
         rig.input_quantity().name,
         force(rig, force_n),
         angles.join(" ")

@@ -1,11 +1,14 @@
 //! The plant of a rig file: `[cart]`, `[[link]]` and `[gravity]`, or `[model]`.
 
+use std::f64::consts::TAU;
+
 use serde::Serialize;
 
 use super::super::base::Base;
 use super::super::error::RigError;
 use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
+use super::super::quantity::Quantity;
 use super::super::rule::Rule;
 use super::super::value::{Keys, keys};
 use super::link::{self, LINK, Link, is_zero};
@@ -20,8 +23,26 @@ pub(crate) static CART: Section = Section {
     title: "[cart]",
     meaning: "the cart and its rail",
     absent: Absent::RequiredIf("unless [model]"),
-    keys: &[Cart::KEYS],
+    keys: &[Cart::KEYS, OF_ARM],
 };
+
+/// Keys of an arm that a cart does not have.
+const OF_ARM: &[Key] = &[
+    Key {
+        name: "radius_m",
+        unit: "m",
+        rule: Rule::POSITIVE,
+        meaning: "distance from the arm's axis to the plane in which the links turn",
+        absent: Absent::RequiredIf("unless each [[link]] has its own"),
+    },
+    Key {
+        name: "encoder_counts_per_rev",
+        unit: "counts/rev",
+        rule: Rule::COUNTS,
+        meaning: "resolution of the arm's encoder after quadrature (four counts per line)",
+        absent: Absent::Follows("what encoder_step_rad gives"),
+    },
+];
 
 /// `[gravity]`
 pub(crate) static GRAVITY: Section = Section {
@@ -105,20 +126,18 @@ impl CartInput {
         *self == CartInput::Force
     }
 
+    /// Its name and unit on this base.
+    pub fn quantity(self, base: Base) -> Quantity {
+        match self {
+            Self::Force => base.force(),
+            Self::Acceleration => base.acceleration(),
+        }
+    }
+
     /// The sensor that shows what the motor does (0: cart, 1: first link). What a drive with pulses does to the cart is
     /// known only from its own count.
     pub fn motor_sensor(&self) -> usize {
         usize::from(!self.is_force())
-    }
-
-    /// Its name.
-    pub fn name(&self) -> &'static str {
-        if self.is_force() { "force" } else { "acceleration" }
-    }
-
-    /// Its unit.
-    pub fn unit(&self) -> &'static str {
-        if self.is_force() { "N" } else { "m/s²" }
     }
 
     /// The key of its weight in `[lqr]`.
@@ -189,17 +208,23 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Mass of the cart and all links (kg); a cart whose mass is not given counts nothing.
+    /// Mass of the cart and all links (kg), or moment of inertia of an arm with upright links about its axis (kg·m²); a
+    /// base whose mass is not given counts nothing.
     pub fn total_mass_kg(&self) -> f64 {
-        self.cart.mass_kg.unwrap_or_default() + self.links_mass_kg()
+        let of_links = match self.base {
+            Base::Cart => self.links_mass_kg(),
+            Base::Arm => {
+                let about_axis =
+                    |link: &Link| link.mass_kg * link.radius_m.powi(2) + link.axial_inertia_kg_m2;
+                self.links.iter().map(about_axis).sum()
+            }
+        };
+        self.cart.mass_kg.unwrap_or_default() + of_links
     }
 
     /// Distance of the plane of link `index`, counted from 0, from the axis of the arm (m); none on a cart.
     pub fn radius_m(&self, index: usize) -> Option<f64> {
-        match self.base {
-            Base::Cart => None,
-            Base::Arm { radius_m } => Some(self.links.get(index)?.radius_m.unwrap_or(radius_m)),
-        }
+        if self.base.is_cart() { None } else { Some(self.links.get(index)?.radius_m) }
     }
 
     /// Mass of all links (kg).
@@ -220,7 +245,7 @@ impl PlantDescription {
 
 /// Reads the plant, which the file gives either as a chain or as a linear model.
 pub(crate) fn plant(root: &Table<'_>, input: CartInput) -> Result<PlantDescription, RigError> {
-    const ONE: &str = "keep [model], or [cart] with its [[link]]s and [gravity], not both";
+    const ONE: &str = "keep [model], or [cart] or [arm] with its [[link]]s and [gravity], not both";
     for part in ["cart", "link", "gravity"] {
         root.not_both("model", part, ONE)?;
     }
@@ -236,8 +261,11 @@ pub(crate) fn plant(root: &Table<'_>, input: CartInput) -> Result<PlantDescripti
 
 fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
     const LINKS: &str = "one [[link]] table per link, from the cart outwards";
-    let cart = root.need("cart", "[cart] and its [[link]]s, or [model]: the plant is not described")?;
-    let cart = cart_driven_by(input, &cart.table(&CART)?)?;
+    let cart =
+        root.need("cart", "[cart] and its [[link]]s, or [model]: the plant is not described; an [arm] takes the place of a [cart]")?;
+    let table = cart.table(&CART)?;
+    let (cart, base) = (cart_driven_by(input, &table)?, root.base());
+    let radius_m = table.get("radius_m").map(|_| table.value("radius_m")).transpose()?;
     let links = root.need(LINK.name, LINKS)?;
     let entries = links.list("a list of tables", LINKS)?;
     if !(1..=MAX_LINKS).contains(&entries.len()) {
@@ -245,14 +273,20 @@ fn chain(root: &Table<'_>, input: CartInput) -> Result<Chain, RigError> {
     }
     let gravity_m_per_s2 = root.get("gravity").map_or(Ok(GRAVITY_M_PER_S2), |node| gravity(&node))?;
     let links = entries.iter().enumerate();
-    let links = links.map(|(index, entry)| link::link(entry, gravity_m_per_s2, index == 0));
-    let links = links.collect::<Result<_, _>>()?;
-    Ok(Chain { cart, base: Base::Cart, links, gravity_m_per_s2, input })
+    let links = links.map(|(index, entry)| link::link(entry, gravity_m_per_s2, index == 0, radius_m));
+    let links = links.collect::<Result<Vec<_>, _>>()?;
+    if !base.is_cart() && links.iter().any(|link| link.radius_m == 0.0) {
+        return Err(table.missing("radius_m", &table.asks_for("radius_m")));
+    }
+    Ok(Chain { cart, base, links, gravity_m_per_s2, input })
 }
 
 /// A force moves a mass; a drive that imposes an acceleration also knows where it has put the cart.
 fn cart_driven_by(input: CartInput, table: &Table<'_>) -> Result<Cart, RigError> {
-    let cart = Cart::read(table)?;
+    let mut cart = Cart::read(table)?;
+    if !table.base().is_cart() {
+        cart.encoder_step_m = of_a_turn(table, &cart)?;
+    }
     let given = ["encoder_step_m", "sensor_bits", "sensor_noise_m"].map(|key| table.get(key));
     match (input, given.iter().flatten().next()) {
         (CartInput::Force, _) if cart.mass_kg.is_none() => {
@@ -263,7 +297,7 @@ fn cart_driven_by(input: CartInput, table: &Table<'_>) -> Result<Cart, RigError>
             "leave it out: the drive's pulses are the position, and step_m of [actuator] is its step",
         )),
         _ => match given {
-            [None, Some(_), _] => {
+            [None, Some(_), _] if cart.encoder_step_m.is_none() => {
                 Err(table.missing("encoder_step_m", "the travel per count of the sensor in m"))
             }
             [_, None, Some(_)] => {
@@ -272,6 +306,22 @@ fn cart_driven_by(input: CartInput, table: &Table<'_>) -> Result<Cart, RigError>
             _ => Ok(cart),
         },
     }
+}
+
+/// The angle per count (rad) of an arm's sensor, whichever way the file gives it.
+fn of_a_turn(table: &Table<'_>, arm: &Cart) -> Result<Option<f64>, RigError> {
+    table.not_both("encoder_step_m", "encoder_counts_per_rev", "keep the one the data sheet gives")?;
+    table.not_both(
+        "encoder_step_m",
+        "sensor_bits",
+        "a turn of the sensor is one of the arm: its bits are enough",
+    )?;
+    table.not_both("encoder_counts_per_rev", "sensor_bits", "keep the one that the board reads")?;
+    let counts = match table.get("encoder_counts_per_rev") {
+        Some(_) => Some(table.value("encoder_counts_per_rev")?),
+        None => arm.sensor_bits.map(f64::exp2),
+    };
+    Ok(arm.encoder_step_m.or(counts.map(|counts| TAU / counts)))
 }
 
 fn gravity(node: &Node<'_>) -> Result<f64, RigError> {

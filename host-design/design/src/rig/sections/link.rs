@@ -84,6 +84,20 @@ const LINK_KEYS: &[Key] = &[
         absent: Absent::Follows("what friction_n_m_s_per_rad gives"),
     },
     Key {
+        name: "radius_m",
+        unit: "m",
+        rule: Rule::POSITIVE,
+        meaning: "distance from an arm's axis to the plane in which the link turns",
+        absent: Absent::Follows("radius_m of [arm]"),
+    },
+    Key {
+        name: "axial_inertia_kg_m2",
+        unit: "kg·m²",
+        rule: Rule::NOT_NEGATIVE.worded("a number >= 0, at most twice inertia_kg_m2"),
+        meaning: "moment of inertia of a thick link about its own length, which turns only with an arm",
+        absent: Absent::Numbers(&[0.0]),
+    },
+    Key {
         name: "encoder_step_rad",
         unit: "rad",
         rule: Rule::ANGLE,
@@ -153,9 +167,9 @@ pub struct Link {
     /// Age of its reading at the tick (s).
     #[serde(skip_serializing_if = "is_zero")]
     pub sensor_delay_s: f64,
-    /// Distance of its plane from an arm's axis (m); the radius of the arm if not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub radius_m: Option<f64>,
+    /// Distance of its plane from an arm's axis (m); 0 on a cart.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub radius_m: f64,
     /// Moment of inertia about its own length (kg·m²), which turns only with an arm.
     #[serde(skip_serializing_if = "is_zero")]
     pub axial_inertia_kg_m2: f64,
@@ -196,7 +210,13 @@ pub const MEASUREMENTS_OF_A_LINK: [&str; 4] =
 const BESIDE_RAD: f64 = 0.2;
 
 /// Reads one `[[link]]`; the lowest one turns half a turn from hanging to upright.
-pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64, is_lowest: bool) -> Result<Link, RigError> {
+/// `radius_m` is that of its arm.
+pub(super) fn link(
+    node: &Node<'_>,
+    gravity_m_per_s2: f64,
+    is_lowest: bool,
+    radius_m: Option<f64>,
+) -> Result<Link, RigError> {
     const ONE_INERTIA: &str = "keep the one that you measured";
     let table = node.table(&LINK)?;
     table.not_both("inertia_kg_m2", "inertia_about_joint_kg_m2", ONE_INERTIA)?;
@@ -214,8 +234,8 @@ pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64, is_lowest: bool) -> R
         friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
         encoder: link_encoder(&table, is_lowest)?,
         sensor_delay_s: table.value("sensor_delay_s")?,
-        radius_m: None,
-        axial_inertia_kg_m2: 0.0,
+        radius_m: table.value::<Option<f64>>("radius_m")?.or(radius_m).unwrap_or_default(),
+        axial_inertia_kg_m2: axial_inertia(&table)?,
     };
     if let (None, Some(node)) = (link.encoder, table.get("sensor_delay_s")) {
         return Err(
@@ -230,6 +250,18 @@ pub(super) fn link(node: &Node<'_>, gravity_m_per_s2: f64, is_lowest: bool) -> R
     }
     link.take_swing(&table, gravity_m_per_s2)?;
     Ok(link)
+}
+
+/// No body has a moment of inertia that is larger than the sum of the other two.
+fn axial_inertia(table: &Table<'_>) -> Result<f64, RigError> {
+    let axial: f64 = table.value("axial_inertia_kg_m2")?;
+    match (table.get("axial_inertia_kg_m2"), table.value::<Option<f64>>("inertia_kg_m2")?) {
+        (Some(node), Some(across)) if axial > 2.0 * across => {
+            let key = table.key("axial_inertia_kg_m2");
+            Err(node.out_of_range(key.rule.accepts, "give the smaller one of its moments of inertia"))
+        }
+        _ => Ok(axial),
+    }
 }
 
 impl Link {

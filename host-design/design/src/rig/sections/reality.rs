@@ -1,10 +1,11 @@
 //! `[reality]`: how the machine on the bench differs from the model.
 
+use super::super::base::Base;
 use super::super::error::RigError;
 use super::super::key::{Absent, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
-use super::super::value::{Keys, PerJoint, keys};
+use super::super::value::{Keys, PerJoint, Value, keys};
 use super::chain::{CartInput, Chain, PlantDescription};
 
 /// `[reality]`
@@ -222,6 +223,16 @@ impl Reality {
         ]
         .into_iter()
         .flatten()
+    }
+
+    /// The same imperfections of a machine with this base, whose dry friction has the values of that base where it is
+    /// left out.
+    #[must_use]
+    pub fn on(mut self, base: Base) -> Self {
+        let value = |name| f64::when_absent(base.key(&REALITY, name).absent).unwrap_or_default();
+        self.friction.stribeck_m_per_s = value("stribeck_m_per_s");
+        self.friction.presliding_m = value("presliding_m");
+        self
     }
 }
 

@@ -10,7 +10,7 @@ use upright_design::rig::{Base, Cart, Chain, Link};
 pub(crate) fn rod(mass_kg: f64, length_m: f64) -> Link {
     Link {
         sensor_delay_s: 0.0,
-        radius_m: None,
+        radius_m: 0.0,
         axial_inertia_kg_m2: 0.0,
         mass_kg,
         length_m,
@@ -61,7 +61,7 @@ pub(crate) fn with_friction(mut chain: Chain, factor: f64) -> Chain {
 /// Any link that a workshop would make: 10 g to 1 kg, 5 cm to 1 m, its mass anywhere along it.
 pub(crate) fn any_link() -> impl Strategy<Value = Link> {
     let given = prop::option::of((0.1..1.0f64, 0.01..0.3f64));
-    let on_arm = (prop::option::of(0.05..0.5f64), 0.0..1e-3f64);
+    let on_arm = (0.05..0.5f64, 0.0..1e-3f64);
     (0.01..1.0f64, 0.05..1.0f64, given, 0.0..0.01f64, on_arm).prop_map(
         |(mass, length, given, friction, on_arm)| Link {
             radius_m: on_arm.0,
@@ -77,7 +77,7 @@ pub(crate) fn any_link() -> impl Strategy<Value = Link> {
 
 /// Any chain of `links` such links on a cart of 50 g to 5 kg, or on an arm with such an inertia.
 pub(crate) fn any_chain(links: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Chain> {
-    let base = prop::sample::select(vec![Base::Cart, Base::Arm { radius_m: 0.3 }]);
+    let base = prop::sample::select(vec![Base::Cart, Base::Arm]);
     (base, 0.05..5.0f64, 0.0..5.0f64, prop::collection::vec(any_link(), links), 1.0..25.0f64).prop_map(
         |(base, cart_mass, friction, links, gravity)| {
             let mut any = Chain { base, ..chain(cart_mass, links) };

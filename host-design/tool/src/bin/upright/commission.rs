@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::table::{Gains, write_atomically};
 use upright_identify::IdentifyError;
 use upright_tool::commission::{
@@ -74,6 +74,7 @@ pub(crate) struct CommissionCommand {
 impl CommissionCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        rig.needs_cart(CartOnly::Conversation, &self.rig)?;
         commissionable(&rig)?;
         if self.zeros && rig.sensors().iter().skip(1).all(|sensor| sensor.absolute.is_none()) {
             let file = self.rig.display();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use upright_design::export::c_header;
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::table::{Gains, write_atomically};
 use upright_tool::simulator_model::{mjcf, urdf};
 
@@ -51,6 +51,9 @@ struct Files {
 impl ExportCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        if self.files.mjcf.is_some() || self.files.urdf.is_some() {
+            rig.needs_cart(CartOnly::OtherSimulators, &self.rig)?;
+        }
         let failed = self.rig.display();
         let mut written = Vec::new();
         if let Some(file) = self.files.c {

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::table::write_atomically;
 use upright_identify::{Identification, Log, Recordings, Settings, identify_recordings, rig_file};
 use upright_tool::identified::{json, page, text};
@@ -98,6 +98,7 @@ impl IdentifyCommand {
             return Err(Failure::argument("--shard and --merge: only with --coverage, which has many runs"));
         }
         let rig = Rig::from_path(&self.rig)?;
+        rig.needs_cart(CartOnly::Identification, &self.rig)?;
         let recordings = Recordings::from_paths(&rig, &self.logs, &self.reading.reading())?;
         if let Some(path) = &self.csv {
             return convert(&rig, &recordings, path, |log, steps, out| log.write_csv(steps, out));

@@ -103,7 +103,7 @@ impl RobustCommand {
         if let (Some(path), Some(front)) = (&self.svg, &front) {
             let figure = front_figure(
                 front,
-                rig.actuator.input(),
+                rig.input_quantity(),
                 &format!("{}: least ripple that survives", rig.name),
             );
             write_atomically(path, figure.svg()?.as_bytes())?;

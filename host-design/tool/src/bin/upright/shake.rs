@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::table::{Gains, write_atomically};
 use upright_identify::{LineError, Log, OverLine, shake};
 use upright_tool::in_the_loop::run_shaken;
@@ -62,6 +62,7 @@ const LAST_WAIT: Duration = Duration::from_millis(500);
 impl ShakeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let rig = Rig::from_path(&self.rig)?;
+        rig.needs_cart(CartOnly::Identification, &self.rig)?;
         warn_of_an_arm(&rig);
         let log = self.shaken(&rig)?;
         write_atomically(&self.log, &log.to_bytes())?;

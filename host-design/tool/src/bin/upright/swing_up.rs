@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 use upright_design::motion::Transition;
-use upright_design::rig::{CartInput, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
@@ -126,10 +126,10 @@ impl SwingUpCommand {
     fn trade(&self, rig: &Rig) -> Result<(), Failure> {
         let failed = |source: SwingUpError| Failure::of_rig(&rig.name, source);
         let solved = with_progress(|progress| solved(rig, TRADED, self.seed, progress)).map_err(failed)?;
-        let (title, input) = (format!("{}: candidates of a raising", rig.name), rig.actuator.input());
-        self.draw(&trade_figure(&title, &solved, input))?;
+        let title = format!("{}: candidates of a raising", rig.name);
+        self.draw(&trade_figure(&title, &solved, rig))?;
         let object = json!({ "rig": rig.name, "tried": TRADED, "solved": solved });
-        print(self.json, &object, || traded_text(&solved, input))
+        print(self.json, &object, || traded_text(&solved, rig))
     }
 
     /// Writes a figure as --svg and --csv say.
@@ -223,10 +223,11 @@ pub(crate) fn with_margins(
 }
 
 /// Duration, force and robustness of each candidate.
-fn traded_text(solved: &[SolvedCandidate], input: CartInput) -> String {
-    let largest = format!("{} ({})", input.name(), input.unit());
+fn traded_text(solved: &[SolvedCandidate], rig: &Rig) -> String {
+    let (largest, unit) = (rig.input_quantity().title(), rig.output_quantity().unit);
     let width = largest.len() + 1;
-    let head = format!("duration (s)  {largest}  farthest (m)  fragility     arrive  with twice the errors");
+    let head =
+        format!("duration (s)  {largest}  farthest ({unit})  fragility     arrive  with twice the errors");
     let line = |SolvedCandidate { duration_s, input, position_m, score, runs, wider }: &SolvedCandidate| {
         let [arrive, twice] = [runs, wider].map(|runs| format!("{} of {}", runs.arrived, runs.runs));
         format!(
@@ -280,7 +281,8 @@ fn print_rows(rig: &Rig, rows: &[SwingUpRow], is_json: bool) -> Result<(), Failu
 }
 
 fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
-    let (mut text, input) = (format!("{}\n", rig.name), rig.actuator.input());
+    let (mut text, input) = (format!("{}\n", rig.name), rig.input_quantity());
+    let (position, speed, noun) = (rig.base().position(), rig.base().speed(), rig.base().noun());
     for MotionJudgement { transition, search, score, peaks, runs } in [&plan.raise, &plan.lower] {
         let percent = runs.interval.map(|end| 100.0 * end);
         // Writing into a string cannot fail.
@@ -292,8 +294,8 @@ fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
             text,
             "  duration                  {:>10.3} s\n  \
                {:<25} {:>10.2} {}\n  \
-               farthest from the middle  {:>10.3} m\n  \
-               largest speed of the cart {:>10.2} m/s\n  \
+               farthest from the middle  {:>10.3} {}\n  \
+               {:<25} {:>10.2} {}\n  \
                largest rate of a joint   {:>10.1} rad/s\n  \
                used of the nearest limit {:>10.0} %\n  \
                error of a tick           {:>10.1e} (adaptive integrator)\n  \
@@ -301,11 +303,14 @@ fn text(rig: &Rig, plan: &SwingUpPlan) -> String {
                random runs that arrive   {:>10} of {} (95 % interval {:.1} to {:.1} %)\n  \
                largest deviation         {:>10.3} rad\n",
             peaks.duration_s,
-            format!("largest {}", input.name()),
+            format!("largest {}", input.name),
             peaks.input,
-            input.unit(),
+            input.unit,
             peaks.position_m,
+            position.unit,
+            format!("largest speed of the {noun}"),
             peaks.speed_m_per_s,
+            speed.unit,
             peaks.rate_rad_per_s,
             100.0 * peaks.used,
             peaks.drift,

@@ -230,12 +230,12 @@ fn text(
     transitions: &[(Transition, PlannedMotion)],
     runs: &[TransitionRuns],
 ) -> String {
-    let (links, input) = (rig.links(), rig.actuator.input());
+    let (links, input) = (rig.links(), rig.input_quantity());
     let mut text = format!("{}, one motion after the other\n", rig.name);
-    let largest = format!("{} ({})", input.name(), input.unit());
+    let (largest, farthest) = (input.title(), format!("farthest ({})", rig.output_quantity().unit));
     let width = largest.len() + 2;
     // Writing into a string cannot fail.
-    let _ = writeln!(text, "motion      duration (s)  {largest}  farthest (m)     arrive  95 % interval (%)");
+    let _ = writeln!(text, "motion      duration (s)  {largest}  {farthest}     arrive  95 % interval (%)");
     for TransitionRuns { transition, tried, arrived, interval } in runs {
         let motion = match transition {
             Transition::Up => Some(&swing_up.raise),

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright::table::Law;
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::RunPlace;
@@ -62,6 +62,7 @@ pub(crate) struct TwinCommand {
 impl TwinCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
+        rig.needs_cart(CartOnly::Page, &self.variation.rig)?;
         let table =
             with_stored_motions(&self.variation.rig, &rig, table, Wanted::from_option(self.transitions))?;
         let built = match self.port {

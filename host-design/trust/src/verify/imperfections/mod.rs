@@ -47,7 +47,7 @@ pub fn imperfections(
     };
     let mut alone: Vec<Survival> = parallel::try_map(Imperfection::all_of(rig), one)?;
     alone.sort_by(|a, b| b.danger.total_cmp(&a.danger));
-    let together = (rig.reality != Reality::default())
+    let together = (rig.reality != Reality::default().on(rig.base()))
         .then(|| search.verdict(rig, Setpoint::RestsAndMoves))
         .transpose()?;
     Ok(Imperfections { law, settings: *settings, alone, left_out: LeftOut::of(rig), together })
@@ -109,7 +109,7 @@ pub fn required_imperfections(
         let verdict = search.verdict(rig, Setpoint::RestsAndMoves)?;
         Ok(RequiredSurvival { key: "reality", requirement: OF_REALITY, size: None, verdict })
     };
-    let whole = (rig.reality != Reality::default()).then(of_reality);
+    let whole = (rig.reality != Reality::default().on(rig.base())).then(of_reality);
     rig.must_survive.iter().map(required).chain(whole).collect::<Result<_, VerifyError>>()
 }
 

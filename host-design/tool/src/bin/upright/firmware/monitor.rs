@@ -16,7 +16,7 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use signal_hook::consts::SIGHUP;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright_closed_loop::client::ExpectedRig;
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_tool::monitor::record::{TelemetryCsv, json};
 use upright_tool::monitor::{MonitorAction, SerialLine, action, now, request, view};
 
@@ -75,6 +75,10 @@ impl MonitorCommand {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
         let until = self.duration.map(|duration| Instant::now() + Duration::from_secs_f64(duration));
+        let rig = self.rig.as_deref().map(Rig::from_path).transpose()?;
+        if let Some((rig, path)) = rig.as_ref().zip(self.rig.as_deref()) {
+            rig.needs_cart(CartOnly::Conversation, path)?;
+        }
         if let Some((port, rig)) = self.web.zip(self.rig.as_deref()) {
             let (rig, table) = designed(rig, Wanted::SwingUp)?;
             let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
@@ -83,7 +87,7 @@ impl MonitorCommand {
         let mut conversation = Conversation {
             model: upright_tool::monitor::Monitor::new(&self.port),
             line: SerialLine::open(&self.port)?,
-            expected: self.rig.as_deref().map(Rig::from_path).transpose()?.as_ref().map(ExpectedRig::from),
+            expected: rig.as_ref().map(ExpectedRig::from),
             recorder: None,
             stop,
             until,

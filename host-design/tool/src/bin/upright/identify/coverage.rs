@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use upright_design::rig::Rig;
+use upright_design::rig::{CartOnly, Rig};
 use upright_design::study::Study;
 use upright_identify::{Coverage, Drawn, TrueFriction, coverage};
 
@@ -78,8 +78,9 @@ fn below_90(text: &str) -> Result<f64, String> {
 }
 
 impl CoverageOptions {
-    pub(super) fn run(&self, rig: &Path, trust_wiring: bool, json: bool) -> Result<(), Failure> {
-        let rig = Rig::from_path(rig)?;
+    pub(super) fn run(&self, path: &Path, trust_wiring: bool, json: bool) -> Result<(), Failure> {
+        let rig = Rig::from_path(path)?;
+        rig.needs_cart(CartOnly::Identification, path)?;
         let drawn = Drawn {
             runs: u64::from(self.runs),
             off_percent: self.off,

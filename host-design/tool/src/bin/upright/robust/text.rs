@@ -3,16 +3,16 @@
 use core::fmt::Write;
 
 use upright_design::number::significant;
-use upright_design::rig::{CartInput, PolePlacement, Rig, Tolerances};
+use upright_design::rig::{PolePlacement, Rig, Tolerances};
 use upright_trust::robust::{Choice, Chosen, Front, JudgeSettings, Judgement, LawNumbers, LawRipple};
 
 /// The choice for each law, then the front.
 pub(super) fn chosen(rig: &Rig, tolerances: &Tolerances, choice: &Choice, front: Option<&Front>) -> String {
     let mut out = head(rig, tolerances);
     // Writing into a String cannot fail.
-    let _ = write_choice(&mut out, choice, rig.actuator.input());
+    let _ = write_choice(&mut out, choice, rig);
     if let Some(front) = front {
-        let _ = write_front(&mut out, front, rig.actuator.input().unit());
+        let _ = write_front(&mut out, front, rig.input_quantity().unit);
     }
     out
 }
@@ -32,7 +32,7 @@ pub(super) fn judged(
     );
     for judgement in laws {
         let _ = writeln!(out, "\n{}", judgement.law);
-        let _ = write_judgement(&mut out, judgement, rig.actuator.input());
+        let _ = write_judgement(&mut out, judgement, rig);
     }
     out
 }
@@ -41,10 +41,10 @@ fn head(rig: &Rig, tolerances: &Tolerances) -> String {
     let stated = tolerances.each().filter(|(_, _, value)| *value != 0.0);
     let stated: Vec<String> =
         stated.map(|(key, _, value)| format!("{key} = {}", significant(value, 4))).collect();
-    format!("{}: {}\n", rig.name, stated.join(", "))
+    format!("{}: {}\n", rig.name, rig.words(&stated.join(", ")))
 }
 
-fn write_choice(out: &mut String, choice: &Choice, input: CartInput) -> core::fmt::Result {
+fn write_choice(out: &mut String, choice: &Choice, rig: &Rig) -> core::fmt::Result {
     let factor = significant(choice.joint_noise_factor, 3);
     writeln!(out, "joint noise × {factor}: {}", list(&choice.joint_noise))?;
     writeln!(out, "judged in runs with shares of friction, zeros and latency")?;
@@ -53,7 +53,12 @@ fn write_choice(out: &mut String, choice: &Choice, input: CartInput) -> core::fm
         match &candidate.numbers {
             LawNumbers::Weights(weights) => {
                 writeln!(out, "  state_weights   {}", list(&weights.state_weights))?;
-                writeln!(out, "  {:<15} {}", input.weight_key(), significant(weights.force_weight, 6))?;
+                writeln!(
+                    out,
+                    "  {:<15} {}",
+                    rig.base().name("lqr", rig.actuator.input().weight_key()),
+                    significant(weights.force_weight, 6)
+                )?;
             }
             LawNumbers::Poles(PolePlacement::Response { far_poles, .. }) => {
                 writeln!(out, "  far_poles       {}", list(far_poles))?;
@@ -61,16 +66,21 @@ fn write_choice(out: &mut String, choice: &Choice, input: CartInput) -> core::fm
             LawNumbers::Poles(PolePlacement::Poles(_)) => {}
         }
         let own = own_ripple_n.map_or("not stable".to_owned(), |ripple| significant(ripple, 3));
-        let (ripple, unit) = (significant(*ripple_n, 3), input.unit());
+        let (ripple, unit) = (significant(*ripple_n, 3), rig.input_quantity().unit);
         writeln!(out, "  predicted ripple {ripple} {unit} (as in the file: {own})")?;
-        write_judgement(out, judgement, input)?;
+        write_judgement(out, judgement, rig)?;
     }
     Ok(())
 }
 
-fn write_judgement(out: &mut String, judgement: &Judgement, input: CartInput) -> core::fmt::Result {
-    let force = if input.is_force() { "force, N rms" } else { "m/s² rms" };
-    let head = ["share", "survive", force, "angle, mrad", "cart, mm", "ended by"];
+fn write_judgement(out: &mut String, judgement: &Judgement, rig: &Rig) -> core::fmt::Result {
+    let (input, base) = (rig.input_quantity(), rig.base());
+    let force = match rig.actuator.input().is_force() {
+        true => format!("{}, {} rms", input.name, input.unit),
+        false => format!("{} rms", input.unit),
+    };
+    let position = format!("{}, m{}", base.noun(), base.position().unit);
+    let head = ["share", "survive", &force, "angle, mrad", &position, "ended by"];
     let row = |[share, survived, force, angle, cart, ended_by]: [&str; 6]| {
         format!("  {share:<8}{survived:>12}{force:>15}{angle:>14}{cart:>11}   {ended_by}")
     };
@@ -82,7 +92,7 @@ fn write_judgement(out: &mut String, judgement: &Judgement, input: CartInput) ->
         // They are of the runs that survived: blank if none did.
         let [force, angle, cart] =
             figures.map(|figure| if runs.survived == 0 { String::new() } else { significant(figure, 3) });
-        let ended_by = runs.ended_by.map_or(String::new(), |kind| kind.to_string());
+        let ended_by = runs.ended_by.map_or(String::new(), |kind| rig.words(&kind.to_string()));
         writeln!(out, "{}", row([&share, &survived, &force, &angle, &cart, &ended_by]).trim_end())?;
     }
     match judgement.corners {
