@@ -51,9 +51,11 @@ impl DrawnRun<'_> {
 
     fn position(&self, chain: &Chain) -> Panel {
         let rail = chain.cart.travel_m;
-        let name = format!("rail {} to {} m", number(rail[0]), number(rail[1]));
+        let base = chain.base;
+        let right = base.position().of(&number(rail[1]));
+        let name = base.words(&format!("rail {} to {right}", number(rail[0])));
         let mut panel = self
-            .panel("position (m)")
+            .panel(&base.position().title())
             .with(Curve::reference("set-point", self.curve(|sample| sample.target)));
         if self.trace.samples().any(|sample| sample.setpoint != sample.target) {
             let governed = self.curve(|sample| sample.setpoint);

@@ -14,12 +14,12 @@ const MARGIN: f64 = 24.0;
 const POSES: usize = 28;
 const PATH: usize = 600;
 
-/// The machine from `from_s` to `to_s` (s), as an SVG document. Everything is to scale.
+/// The machine from `from_s` to `to_s` (s), as an SVG document. Everything is to scale; the way of an arm is unrolled.
 pub fn stroboscope_svg(chain: &Chain, trace: &Trace, from_s: f64, to_s: f64) -> String {
     let shown: Vec<(f64, Vec<[f64; 2]>)> = trace
         .samples()
         .filter(|sample| (from_s..=to_s).contains(&sample.t))
-        .map(|sample| (sample.state[0], joints(chain, sample.state)))
+        .map(|sample| (chain.arc_m() * sample.state[0], joints(chain, sample.state)))
         .collect();
     let length: f64 = chain.links.iter().map(|link| link.length_m).sum();
     let farthest = shown.iter().fold(0.0, |most: f64, (x, _)| most.max(x.abs()));
@@ -70,7 +70,7 @@ pub fn stroboscope_svg(chain: &Chain, trace: &Trace, from_s: f64, to_s: f64) -> 
 
 /// Joints and tip of a state (m), from the cart on; y is up.
 fn joints(chain: &Chain, state: &[f64]) -> Vec<[f64; 2]> {
-    let mut at = [state[0], 0.0];
+    let mut at = [chain.arc_m() * state[0], 0.0];
     let mut all = vec![at];
     for (link, angle) in chain.links.iter().zip(absolute_angles(state)) {
         // Angles count counter-clockwise from upright.

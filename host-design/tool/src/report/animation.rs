@@ -48,11 +48,13 @@ const FRAME: f64 = 0.02;
 
 impl Animation {
     pub(super) fn of(rig: &Rig, scenes: &[Scene]) -> Self {
-        let (lengths, rail) = match &rig.plant {
+        // The way of an arm is unrolled.
+        let (lengths, rail, arc) = match &rig.plant {
             PlantDescription::Chain(chain) => {
-                (chain.links.iter().map(|link| link.length_m).collect(), chain.cart.travel_m)
+                let (arc, lengths) = (chain.arc_m(), chain.links.iter().map(|link| link.length_m));
+                (lengths.collect(), chain.cart.travel_m.map(|end| arc * end), arc)
             }
-            PlantDescription::Model(_) => (Vec::new(), [0.0, 0.0]),
+            PlantDescription::Model(_) => (Vec::new(), [0.0, 0.0], 1.0),
         };
         let stride = (FRAME / rig.tick.period_s).round().max(1.0) as usize;
         let every = stride as f64 * rig.tick.period_s;
@@ -75,13 +77,13 @@ impl Animation {
                     Frames {
                         law: run.law.title(),
                         every,
-                        x: shown.iter().map(|s| rounded(s.state[0])).collect(),
-                        target: shown.iter().map(|s| rounded(s.target)).collect(),
+                        x: shown.iter().map(|s| rounded(arc * s.state[0])).collect(),
+                        target: shown.iter().map(|s| rounded(arc * s.target)).collect(),
                         angles: shown
                             .iter()
                             .map(|s| absolute_angles(s.state).map(rounded).collect())
                             .collect(),
-                        fall: run.summary.fall.as_ref().map(ToString::to_string),
+                        fall: run.summary.fall.as_ref().map(|fall| rig.words(&fall.to_string())),
                     }
                 })
                 .collect(),

@@ -42,7 +42,8 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
         GROUND - CART - 12.0,
         reference_colour()
     )?;
-    for wheel in [-28.0, 28.0] {
+    let wheels: &[f64] = if chain.base.is_cart() { &[-28.0, 28.0] } else { &[] };
+    for wheel in wheels {
         dot(out, [MIDDLE + wheel, GROUND - 6.0], 6.0, "#000000")?;
     }
     let mut bottom = 0.0;
@@ -68,10 +69,16 @@ fn draw(out: &mut String, chain: &Chain) -> core::fmt::Result {
     }
     dot(out, [MIDDLE, free], 3.0, "#000000")?;
     if let Some(mass_kg) = chain.cart.mass_kg {
-        text(out, [MIDDLE + 56.0, GROUND - 20.0], &format!("cart: {} kg", number(mass_kg)))?;
+        text(
+            out,
+            [MIDDLE + 56.0, GROUND - 20.0],
+            &format!("{}: {}", chain.base.noun(), chain.base.mass().of(&number(mass_kg))),
+        )?;
     }
     let [left, right] = chain.cart.travel_m;
-    text(out, [20.0, GROUND + 20.0], &format!("rail from {} to {} m", number(left), number(right)))?;
+    let right = chain.base.position().of(&number(right));
+    let travel = chain.base.words(&format!("rail from {} to {right}", number(left)));
+    text(out, [20.0, GROUND + 20.0], &travel)?;
     let (bar, size) = scale_bar(scale);
     let end = WIDTH - 24.0;
     line(out, [end - size, GROUND + 14.0], [end, GROUND + 14.0], "#000000", 3.0)?;

@@ -30,6 +30,8 @@ pub(super) struct ReportPage<'a> {
     tick_ms: String,
     delay_ticks: u8,
     is_chain: bool,
+    carrier: &'static str,
+    state_units: &'static str,
     is_disturbed: bool,
     /// Name, symbol and unit of the plant's input.
     input: String,
@@ -127,6 +129,8 @@ impl<'a> ReportPage<'a> {
             tick_ms: significant(1e3 * rig.tick.period_s, DIGITS),
             delay_ticks: rig.tick.delay_ticks,
             is_chain: rig.chain().is_some(),
+            carrier: if rig.base().is_cart() { "a cart" } else { "an arm" },
+            state_units: if rig.base().is_cart() { "m, m/s, rad and rad/s" } else { "rad and rad/s" },
             is_disturbed: Disturbance::of(rig) != Disturbance::NONE,
             input: format!("{} u ({})", input.name, input.unit),
             failed: checks.iter().filter(|check| !check.holds).count(),

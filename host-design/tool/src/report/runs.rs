@@ -195,7 +195,8 @@ fn noise_text(rig: &Rig, seed: u64) -> String {
     let force = if disturbance.force_n == 0.0 {
         String::new()
     } else {
-        format!("a force of {} N rms on the cart and ", number(disturbance.force_n))
+        let (force, noun) = (rig.base().force(), rig.base().noun());
+        format!("a {} of {} rms on the {noun} and ", force.name, force.of(&number(disturbance.force_n)))
     };
     let torque = number(disturbance.torque_n_m);
     format!("{force}torques of {torque} N·m rms at every joint, drawn again in each tick (seed {seed})")

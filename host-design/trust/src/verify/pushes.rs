@@ -89,7 +89,7 @@ impl PushSearch<'_> {
     pub fn first(&self, is_supervised: bool) -> Result<Option<(f64, FallKind)>, VerifyError> {
         let chain = chain(self.rig, "pushes")?;
         // A force at the end of an arm moves its inertia by the square of the lever.
-        let lever = chain.radius_m(0).unwrap_or(1.0);
+        let lever = chain.arc_m();
         let weight_n = chain.gravity_m_per_s2 * chain.total_mass_kg() / lever.powi(2);
         let start = START * (DURATIONS_S[0] / self.push.duration_s).min(1.0);
         let mut ended = None;

@@ -1,6 +1,7 @@
 //! Tests of verification and of the search for robust weights. One program, so that linking happens once.
 
 mod acceleration_imperfect;
+mod arm;
 mod known_friction;
 mod pushes;
 mod robust;

@@ -227,6 +227,11 @@ impl Chain {
         if self.base.is_cart() { None } else { Some(self.links.get(index)?.radius_m) }
     }
 
+    /// Travel of the first joint per unit of the base's position: 1 on a cart, and the arc per angle on an arm (m/rad).
+    pub fn arc_m(&self) -> f64 {
+        self.radius_m(0).unwrap_or(1.0)
+    }
+
     /// Mass of all links (kg).
     pub fn links_mass_kg(&self) -> f64 {
         self.links.iter().map(|link| link.mass_kg).sum()
