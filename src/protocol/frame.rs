@@ -117,19 +117,29 @@ impl<const N: usize> Receiver<N> {
     /// Takes the next byte. If it completes a frame, returns its message, or why it cannot be decoded. Empty frames
     /// are ignored.
     pub fn push<T: for<'de> Deserialize<'de>>(&mut self, byte: u8) -> Option<Result<T, FrameError>> {
-        if byte != DELIMITER {
-            // Bytes that do not fit are only counted: a frame longer than the buffer is then dropped as a whole.
-            if let Some(place) = self.buffer.get_mut(self.length) {
-                *place = byte;
-            }
-            self.length = self.length.saturating_add(1);
-            return None;
+        if self.completes_frame(byte) { Some(self.decoded()) } else { None }
+    }
+
+    /// Takes the next byte. Whether it completes a frame, which is to be [`decoded`](Self::decoded) before the next byte.
+    pub fn completes_frame(&mut self, byte: u8) -> bool {
+        if byte == DELIMITER {
+            return self.length > 0;
         }
+        // Bytes that do not fit are only counted: a frame longer than the buffer is then dropped as a whole.
+        if let Some(place) = self.buffer.get_mut(self.length) {
+            *place = byte;
+        }
+        self.length = self.length.saturating_add(1);
+        false
+    }
+
+    /// Decodes the frame that is complete, and drops it.
+    ///
+    /// # Errors
+    /// [`FrameError`]; nothing of a damaged frame is used.
+    pub fn decoded<T: for<'de> Deserialize<'de>>(&mut self) -> Result<T, FrameError> {
         let length = core::mem::take(&mut self.length);
-        if length == 0 {
-            return None;
-        }
-        Some(self.buffer.get_mut(..length).ok_or(FrameError::Long).and_then(|frame| decode(frame)))
+        self.buffer.get_mut(..length).ok_or(FrameError::Long).and_then(|frame| decode(frame))
     }
 }
 
