@@ -16,6 +16,11 @@ use upright_tool::image::{Compiler, PROFILE, TARGET, compiler};
 
 const DOCUMENT: &str = include_str!("../../docs/own-board.md");
 
+/// File for the profiles of this repository.
+const PROFILES: &str = "profiles.toml";
+/// Upright's crates that the host program needs: they are compiled again, because they belong to another workspace here.
+const COMPILED_AGAIN: [&str; 2] = ["upright-design", "upright-closed-loop"];
+
 /// The files in the document: a line with the name and a colon, an empty line, and a block.
 fn files(document: &str) -> BTreeMap<&str, String> {
     let mut files = BTreeMap::new();
@@ -87,6 +92,8 @@ fn foreign_crate() -> PathBuf {
     files.insert("src/gains.rs", gains_source(&rig, &table(&rig)));
     // The same versions as in this repository, for packages that both need.
     files.insert("Cargo.lock", std::fs::read_to_string(Path::new(&root).join("Cargo.lock")).unwrap());
+    let manifest = std::fs::read_to_string(Path::new(&root).join("Cargo.toml")).unwrap();
+    files.insert(PROFILES, manifest[manifest.find("[profile").unwrap()..].to_owned());
 
     let mut hash = DefaultHasher::new();
     files.hash(&mut hash);
@@ -130,12 +137,13 @@ fn a_crate_made_from_the_document_balances_on_the_host() {
     let folder = foreign_crate();
     let host = |with_the_rig_of: &Path| {
         let mut cargo = Command::new(env!("CARGO"));
-        // With the same settings as the tests, the dependencies that they share need not be compiled again.
+        // With the same profiles as the tests, the dependencies that they share need not be compiled again.
         cargo.current_dir(with_the_rig_of).env("CARGO_TARGET_DIR", target_of_the_tests());
-        for (setting, value) in [("DEBUG", "false"), ("CODEGEN_UNITS", "2"), ("LTO", "off")] {
-            cargo.env(format!("CARGO_PROFILE_DEV_{setting}"), value);
-        }
         cargo.args(["run", "--quiet", "--bin", "host", "--manifest-path"]).arg(folder.join("Cargo.toml"));
+        cargo.arg("--config").arg(folder.join(PROFILES)).args(["--config", "profile.dev.opt-level=0"]);
+        for name in COMPILED_AGAIN {
+            cargo.arg("--config").arg(format!("profile.dev.package.{name}.opt-level=0"));
+        }
         cargo
     };
     let said = run(&mut host(&folder));
