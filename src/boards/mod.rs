@@ -10,9 +10,11 @@
 //! A board of your own needs no row: it implements [`Board`](crate::board::Board).
 
 pub mod f4;
+pub mod parts;
 mod row;
 mod rows;
 pub mod rp;
+pub mod two_wires;
 pub mod wiring;
 
 pub use row::{BoardRow, Family, PULSES_HZ, cycles_per_tick};

@@ -100,6 +100,8 @@ pub enum PinMode {
     Input,
     /// Push-pull output, initially low.
     Output,
+    /// Output that pulls low or leaves the pin alone, initially alone.
+    OpenDrain,
     /// Alternate function of this number.
     Alternate(u8),
     /// Analog input.

@@ -5,7 +5,7 @@ use super::Firmware;
 use crate::board::{BadSamples, Inputs};
 use crate::supervision::fault::Fault;
 use crate::supervision::finding::Finding;
-use crate::table::{SensorRow, SwingUp};
+use crate::table::{SensorRow, SwingUp, without_errors};
 
 /// A sensor with this much of [`still_counts`](crate::table::SensorRow::still_counts) or more has noise of a count.
 const NOISY_STILL_COUNTS: i32 = 8;
@@ -14,14 +14,16 @@ const NOISY_STILL_COUNTS: i32 = 8;
 const LONGEST_EQUAL_S: f32 = 0.2;
 
 impl<const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'_, NX, NY, S> {
-    /// Replaces bad samples, before the inputs are used. Returns what has failed: the first sensor whose samples were
-    /// bad in all of the last ticks, or whose reading stands still.
+    /// Takes the errors out of the readings of parts, and replaces bad samples, before the inputs are used. Returns
+    /// what has failed: the first sensor whose samples were bad in all of the last ticks, or whose reading stands
+    /// still.
     #[inline(never)]
     pub(super) fn replace_bad_samples(
         &mut self,
         inputs: &mut Inputs<NY>,
         bad: &mut BadSamples<NY>,
     ) -> Option<Finding> {
+        without_errors(&self.table.sensors, &mut inputs.raw_counts);
         let frozen = self.stands_still(&bad.equal_ticks(&inputs.raw_counts, !self.output.enable));
         for (sensor, reading) in inputs.raw_counts.iter_mut().enumerate() {
             if bad.now & 1 << sensor != 0

@@ -57,7 +57,7 @@ pub use observer::ObserverGains;
 #[cfg(test)]
 pub(crate) use part::WordsMut;
 pub use part::{Part, Reader, Resize, Shape, Variant, Words};
-pub use sensor::{ReadingMap, SensorKind, SensorRow};
+pub use sensor::{PartReading, ReadingMap, SensorKind, SensorRow, without_errors};
 pub use steps::StepMap;
 pub use stilling::{ImitatedBase, StillingGains};
 #[cfg(feature = "firmware")]

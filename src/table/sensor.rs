@@ -1,6 +1,9 @@
 //! The sensors: what each measures, how it reads, and its distances in counts.
 
-use crate::numbers::Scalar;
+use core::f32::consts::TAU;
+
+use crate::boards::parts::{PARTS, PartInterface, SensorPart};
+use crate::numbers::{Number, Scalar};
 use crate::table::equilibrium::Equilibrium;
 use crate::table::part::part;
 
@@ -39,6 +42,8 @@ part! {
         Absolute(reading: ReadingMap) = 1,
         /// It reads where it is, but not a whole turn: its readings do not wrap.
         Potentiometer(reading: ReadingMap) = 2,
+        /// It is a part that boards know, and reads where it is within a turn of it.
+        OfPart(part: PartReading) = 3,
     }
 }
 
@@ -53,12 +58,64 @@ part! {
     }
 }
 
+part! {
+    /// The readings of a part, and its errors once and twice per turn.
+    #[derive(Copy)]
+    pub struct PartReading<;> {
+        /// Bits of a reading, and the one while the links hang at rest.
+        pub reading: ReadingMap,
+        /// Number of its row in [`PARTS`](crate::boards::parts::PARTS).
+        pub part: u32,
+        /// Error at the angle ψ from where the links hang, which is taken out of the readings:
+        /// `e(ψ) = c₁ (cos ψ - 1) + s₁ sin ψ + c₂ (cos 2ψ - 1) + s₂ sin 2ψ` with c₁, s₁, c₂ and s₂ (counts).
+        pub errors: [f32; 4],
+    }
+}
+
+impl PartReading {
+    /// The count less the error of its reading. The error is that of the angle, which the reading is near to.
+    pub fn without_error(&self, count: u32) -> u32 {
+        if self.errors == [0.0; 4] {
+            return count;
+        }
+        let ReadingMap { bits, zero_counts } = self.reading;
+        let turn = 1i32 << (bits & 31);
+        let turned = count.wrapping_sub(zero_counts as u32) & (turn as u32).wrapping_sub(1);
+        let (turned, per_count) = (turned as f32, TAU / turn as f32);
+        let error = self.error(per_count * (turned - self.error(per_count * turned)));
+        let half = if error < 0.0 { -0.5 } else { 0.5 };
+        count.wrapping_sub((error + half) as i32 as u32)
+    }
+
+    /// Its error at this angle from where the links hang (rad, counts).
+    fn error(&self, angle: f32) -> f32 {
+        let ([sin], [cos]) = f32::sines_and_cosines(&[angle]);
+        let [c1, s1, c2, s2] = self.errors;
+        c1 * (cos - 1.0) + s1 * sin + 2.0 * sin * (s2 * cos - c2 * sin)
+    }
+
+    /// Its row.
+    pub const fn row(&self) -> Option<&'static SensorPart> {
+        if (self.part as usize) < PARTS.len() { Some(&PARTS[self.part as usize]) } else { None }
+    }
+}
+
+/// Takes their errors once and twice per turn out of the readings of sensors that are parts.
+pub fn without_errors(sensors: &[SensorRow], raw_counts: &mut [u32]) {
+    for (row, count) in sensors.iter().zip(raw_counts) {
+        if let SensorKind::OfPart(part) = row.kind {
+            *count = part.without_error(*count);
+        }
+    }
+}
+
 impl SensorKind {
     /// Its readings, if it is absolute.
     pub const fn reading(&self) -> Option<&ReadingMap> {
         match self {
             SensorKind::Counter => None,
             SensorKind::Absolute(reading) | SensorKind::Potentiometer(reading) => Some(reading),
+            SensorKind::OfPart(part) => Some(&part.reading),
         }
     }
 
@@ -67,17 +124,29 @@ impl SensorKind {
         match self {
             SensorKind::Counter => None,
             SensorKind::Absolute(reading) | SensorKind::Potentiometer(reading) => Some(reading),
+            SensorKind::OfPart(part) => Some(&mut part.reading),
         }
     }
 
-    /// Whether it is absolute.
-    pub const fn is_absolute(&self) -> bool {
-        self.reading().is_some()
+    /// Its row, if it is a part.
+    pub const fn row(&self) -> Option<&'static SensorPart> {
+        match self {
+            SensorKind::OfPart(part) => part.row(),
+            _ => None,
+        }
     }
 
-    /// Whether it is absolute and does not read a whole turn.
-    pub const fn is_potentiometer(&self) -> bool {
-        matches!(self, SensorKind::Potentiometer(_))
+    /// How a board reads it, if it is absolute.
+    pub const fn interface(&self) -> Option<PartInterface> {
+        match self {
+            SensorKind::Counter => None,
+            SensorKind::Absolute(_) => Some(PartInterface::Frames),
+            SensorKind::Potentiometer(_) => Some(PartInterface::Analog),
+            SensorKind::OfPart(part) => match part.row() {
+                Some(row) => Some(row.interface),
+                None => None,
+            },
+        }
     }
 }
 
@@ -102,7 +171,12 @@ impl SensorRow {
     /// Whether every distance has a valid value.
     pub(crate) fn is_sound(&self) -> bool {
         let Self { turn_counts, sign_counts, slow_counts, still_counts, .. } = *self;
-        self.delay_s >= 0.0
+        let is_known = match self.kind {
+            SensorKind::OfPart(part) => part.row().is_some_and(|row| row.bits == part.reading.bits),
+            _ => true,
+        };
+        is_known
+            && self.delay_s >= 0.0
             && [turn_counts, sign_counts, slow_counts, still_counts].iter().all(|&counts| counts >= 0)
     }
 

@@ -1,6 +1,7 @@
 //! Absolute sensors at the joints: their zero instead of homing, their noise, and their wrap-around.
 
 use core::f64::consts::PI;
+use std::path::{Path, PathBuf};
 
 use upright::control::encoder::AbsoluteSensor;
 use upright::protocol::message::{Answer, Request};
@@ -8,17 +9,18 @@ use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::fault::{Cause, Fault};
 use upright::supervision::inhibits::Inhibits;
 use upright::supervision::supervisor::State;
-use upright::table::{Law, ReadingMap, SensorKind};
+use upright::table::{Law, PartReading, ReadingMap, SensorKind};
 use upright_closed_loop::harness::{World, record, with_firmware};
 use upright_design::design::detection_thresholds;
 use upright_design::numerics::spectral_radius;
 use upright_design::reality::RealEncoders;
 use upright_design::rig::{LinkEncoder, PerJoint, Rig};
 use upright_design::simulate::{Bench, Scenario};
+use upright_identify::{Settings, identify, rig_file, shake};
 use upright_plan::Stored;
 use upright_trust::verify::{LoopModel, at_rest_disturbed, linear};
 
-use crate::published::{certified, rig, table};
+use crate::published::{certified, rig, rig_of, rig_path, table};
 use crate::supervised::{ALL_RIGS, ask, balancing, cause, rejected, tick};
 
 /// Reading while the links hang: the first link wraps on its way up, and all of them near upright or hanging.
@@ -389,4 +391,75 @@ fn an_age_needs_a_sensor_and_leaves_stored_motions_as_they_are() {
     let bare = bare.iter().fold(text, |text, line| text.replace(line, ""));
     let error = stating(bare.replace("sensor_bits = 14", "sensor_delay_s = 0.001")).unwrap_err().to_string();
     assert!(error.contains("link[1].sensor_delay_s") && error.contains("only with an encoder"), "{error}");
+}
+
+/// A machine whose sensor is off by 0.7° once and 2.7° twice per turn, and the rig whose file does not know it yet.
+fn badly_mounted() -> (Rig, String) {
+    let text = std::fs::read_to_string(rig_path("single-as5600")).unwrap();
+    let is_stated = |line: &&str| line.contains("_per_turn_");
+    assert_eq!(text.lines().filter(is_stated).count(), 4);
+    let unknown: String =
+        text.lines().filter(|line| !is_stated(line)).map(|line| format!("{line}\n")).collect();
+    let real = "[reality]\neccentricity_rad = 0.012\neccentricity_phase_rad = 0.9\ntwice_per_turn_rad = 0.0471\n\
+                twice_per_turn_phase_rad = -0.6\n";
+    (rig_of(&format!("{unknown}\n{real}")), unknown)
+}
+
+/// How far from its set-point the firmware of `rig` balances the `machine` (m).
+fn off_m(machine: &Rig, rig: &Rig) -> f64 {
+    let values = table(rig);
+    let scenario = Scenario { duration_s: 10.0, ..Scenario::at_rest(machine, Law::Lqr) };
+    let run = with_firmware(&values, |firmware| record(machine, &values, &scenario, firmware));
+    let run = run.unwrap().unwrap();
+    assert!(run.fault.is_none() && run.summary.survives(), "{:?}", run.fault);
+    run.summary.final_error_m.abs()
+}
+
+#[test]
+fn errors_of_2_7_degrees_twice_and_of_0_7_once_per_turn_are_identified_and_taken_out() {
+    let (machine, unknown) = badly_mounted();
+    let file = rig_of(&unknown);
+    let log = [(PathBuf::from("as5600.log"), shake(&machine, 30.0, 3).unwrap())];
+    let settings = Settings { trust_wiring: true, ..Settings::default() };
+    let found = identify(&file, &log, &settings, &|_| ()).unwrap();
+    assert_eq!(found.refusal, None, "{found:?}");
+    let text = rig_file(&unknown, &file, &found, "identified", Path::new("as5600.toml")).unwrap();
+    let identified = rig_of(&text);
+    let [[once, phase], [twice, phase_of_twice]] = identified.chain().unwrap().links[0].errors.harmonics();
+    println!("{once:.4} {phase:.3} {twice:.4} {phase_of_twice:.3}");
+    assert!((twice - 0.0471).abs() < 0.005 && (phase_of_twice + 0.6).abs() < 0.15, "{text}");
+    assert!(!identified.reality.sensors.twice_per_turn_rad.is_any());
+    // Twice per turn, the error is the same hanging and upright; once per turn, the cart stands aside.
+    let [with, without] = [&identified, &file].map(|rig| off_m(&machine, rig));
+    println!("off by {with} m, {without} m without");
+    assert!(with < 0.5 * without && without > 0.05, "{with} {without}");
+}
+
+#[test]
+fn what_is_taken_out_is_the_error_of_the_simulated_sensor() {
+    let mut rig = rig("single-as5600");
+    rig.chain_mut().unwrap().links[0].sensor_delay_s = 0.0;
+    let values = table(&rig);
+    let SensorKind::OfPart(part) = values.sensors[1].kind else { panic!() };
+    let step = f64::from(values.sensors[1].step);
+    let encoders = RealEncoders::of(&rig).unwrap();
+    let off = |part: &PartReading| {
+        let at = |hundredth: i32| {
+            let truth = PI + f64::from(hundredth) / 100.0;
+            let measured = encoders.measured(2, &[0.0, 0.0, truth, 0.0]);
+            let count = ((measured - PI) / step).round() as i64 + i64::from(part.reading.zero_counts);
+            let found = part.without_error(count as u32).wrapping_sub(part.reading.zero_counts as u32) as i32;
+            (f64::from(found) * step + PI - truth).abs()
+        };
+        (-900..900).map(at).fold(0.0, f64::max)
+    };
+    // Rounding, twice, and the third iteration that is not done.
+    assert!(off(&part) < 1.7 * step, "{}", off(&part));
+    // Negative controls: without it, and with the sign of one word changed.
+    assert!(off(&PartReading { errors: [0.0; 4], ..part }) > 0.05);
+    for word in 0..4 {
+        let mut wrong = part;
+        wrong.errors[word] = -wrong.errors[word];
+        assert!(off(&wrong) > 3.0 * step, "{word}: {}", off(&wrong));
+    }
 }

@@ -40,6 +40,7 @@ mod supervisor_false_alarms;
 mod supervisor_faults;
 mod supervisor_rules;
 mod supervisor_session;
+mod two_wires;
 mod verdicts;
 
 use upright_test_support::published;

@@ -12,6 +12,7 @@ import { RP2040, USBCDC } from 'rp2040js';
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { RegisterSensor } from './sensors.mjs';
 import { StepOutput } from './steps.mjs';
 
 const entry = dirname(fileURLToPath(import.meta.resolve('rp2040js')));
@@ -27,6 +28,8 @@ const EDGE = 12;
 const RETURN = 0x20000000;
 /** Levels of phases A and B, in the order in which they follow each other while the count grows. */
 const PHASES = [[0, 0], [1, 0], [1, 1], [0, 1]];
+/** Clock of absolute sensors. */
+const ANGLE_CLOCK = 17;
 const PINS = { limitLow: 13, limitHigh: 14, stop: 15, fault: 16, direction: 11, enable: 12, led: 25 };
 /** The state machine of the dead man's switch: block, number, cycles of a round, its last round's first instruction. */
 const GUARD = { block: 1, machine: 3, round: 6, first: 24, last: 29 };
@@ -65,6 +68,8 @@ export class Pico {
     this.watchdog = () => { throw new Error('the watchdog has ended the run'); };
     this.chip.peripherals[0x40058].onWatchdogTrigger = () => this.watchdog();
     this.#connectUsb();
+    /** Sensors on two wires in the place of encoders. */
+    this.sensors = [];
     for (let encoder = 0; encoder < encoders; encoder++) this.#setPhases(encoder);
     this.contacts({});
   }
@@ -127,9 +132,28 @@ export class Pico {
   }
 
   #setPhases(encoder) {
+    if (this.sensors[encoder]) return;
     const [a, b] = PHASES[this.counts[encoder] & 3];
     this.chip.gpio[2 * encoder].setInputValue(!!b);
     this.chip.gpio[2 * encoder + 1].setInputValue(!!a);
+  }
+
+  /** Sets the registers of the sensor in the place of an encoder, or its defect; connects it, if it is not yet. */
+  registers(encoder, sensor) {
+    const pin = this.chip.gpio[2 * encoder + 1];
+    if (!this.sensors[encoder]) {
+      const connected = new RegisterSensor(sensor);
+      this.sensors[encoder] = connected;
+      const hear = () => {
+        connected.hear(this.chip.gpio[ANGLE_CLOCK].outputValue, !(pin.outputEnable && !pin.outputValue), this.clock.nanos);
+        pin.setInputValue(connected.level);
+      };
+      pin.addListener(hear);
+      this.chip.gpio[ANGLE_CLOCK].addListener(hear);
+      hear();
+    }
+    this.sensors[encoder].set(sensor);
+    pin.setInputValue(this.sensors[encoder].level);
   }
 
   /** Moves encoders by one count each, if they are not where they should be. */

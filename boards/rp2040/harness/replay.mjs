@@ -1,7 +1,7 @@
 // replay.mjs IMAGE.uf2 ENCODERS < TICKS > ANSWERS: runs the image with the inputs of each tick.
 //
-// Each line of TICKS is a JSON object: `counts`, the contacts as `Pico.contacts` takes them, `supply` (steps of the
-// converter), `received` (bytes in hexadecimal). Or it is {"stopTicks": CYCLES}: ticks stop, and the answer says when the
+// Each line of TICKS is a JSON object: `counts`, `registers` of sensors on two wires (null for an encoder), the contacts
+// as `Pico.contacts` takes them, `supply` (steps of the converter), `received` (bytes in hexadecimal). Or it is {"stopTicks": CYCLES}: ticks stop, and the answer says when the
 // power stage was disabled, and when the watchdog would have reset the chip. Or {"openStop": CYCLES}: the emergency stop
 // opens between two ticks, and the answer says when the power stage was disabled. Or {"call": ADDRESS, "pairs": WORDS}: a
 // function of the image is called with each pair of words (hexadecimal), and the answer has the results and the most
@@ -85,6 +85,7 @@ for await (const line of createInterface({ input: process.stdin })) {
   pico.targets = tick.counts.map((count, encoder) => count - first[encoder]);
   // The chip counts its own pulses.
   if (pico.steps.isUsed) pico.targets[0] = 0;
+  tick.registers?.forEach((sensor, encoder) => { if (sensor) pico.registers(encoder, sensor); });
   pico.contacts(tick);
   pico.supply(tick.supply);
   const cycles = pico.tick();

@@ -14,6 +14,7 @@ use crate::peripherals::gpio::ExternalLevel;
 use crate::peripherals::power::{BrownOut, POWER_DOWN_V};
 use crate::peripherals::rcc::{BROWN_OUT_FLAG, Crystal, PIN_FLAG, POWER_FLAG, SOFTWARE_FLAG};
 use crate::peripherals::usart::LineByte;
+use crate::register_sensor::RegisterDefect;
 use crate::timing::CoreTiming;
 use crate::wiring::{BoardWiring, Pin};
 
@@ -55,6 +56,24 @@ pub enum Input {
         encoder: usize,
         /// The defect.
         defect: SensorDefect,
+    },
+    /// The registers of a sensor on two wires in the place of an encoder, which it takes with the first ones.
+    Registers {
+        /// Index into [`BoardWiring::encoders`].
+        encoder: usize,
+        /// Its address, 7 bits.
+        address: u8,
+        /// The first of these registers.
+        first: u8,
+        /// Their values.
+        values: [u8; 5],
+    },
+    /// A defect of such a sensor.
+    RegisterDefect {
+        /// Index into [`BoardWiring::encoders`].
+        encoder: usize,
+        /// The defect.
+        defect: RegisterDefect,
     },
     /// The crystal stops oscillating.
     StopCrystal,
@@ -229,18 +248,10 @@ impl SimulatedBoard {
             }
             Input::ChipSupply(volts) => self.set_chip_supply(volts),
             Input::Encoder { encoder, position, end } => bus.turn_encoder(encoder, position, end),
-            Input::Angle { encoder, reading } => {
-                if let Some(sensor) = bus.angle_sensor(encoder)
-                    && sensor.defect != SensorDefect::Stuck
-                {
-                    sensor.reading = reading & 0x3fff;
-                }
-            }
-            Input::AngleDefect { encoder, defect } => {
-                if let Some(sensor) = bus.angle_sensor(encoder) {
-                    sensor.defect = defect;
-                }
-            }
+            Input::Angle { .. }
+            | Input::AngleDefect { .. }
+            | Input::Registers { .. }
+            | Input::RegisterDefect { .. } => self.apply_to_sensor(input),
             Input::StopCrystal => bus.stop_crystal(),
             Input::Reset(low) => self.hold(low, 0),
             Input::Halt(halted) => bus.halt(halted),
@@ -266,6 +277,30 @@ impl SimulatedBoard {
             }
         }
         self.machine.bus.system.nvic.changed = true;
+    }
+
+    /// Applies an input of an absolute sensor.
+    fn apply_to_sensor(&mut self, input: Input) {
+        let bus = &mut self.machine.bus;
+        match input {
+            Input::Angle { encoder, reading } => {
+                if let Some(sensor) = bus.angle_sensor(encoder)
+                    && sensor.defect != SensorDefect::Stuck
+                {
+                    sensor.reading = reading & 0x3fff;
+                }
+            }
+            Input::AngleDefect { encoder, defect } => {
+                if let Some(sensor) = bus.angle_sensor(encoder) {
+                    sensor.defect = defect;
+                }
+            }
+            Input::Registers { encoder, address, first, values } => {
+                bus.register_sensor(encoder, address, first, values)
+            }
+            Input::RegisterDefect { encoder, defect } => bus.spoil_registers(encoder, defect),
+            _ => {}
+        }
     }
 
     fn set_chip_supply(&mut self, volts: f32) {

@@ -8,12 +8,12 @@ use upright::control::actuator::Drive;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::shaking::SPEED_SHARE;
 use upright::supervision::slow_drive::SlowDrive;
-use upright::table::{Law, StepMap};
+use upright::table::{Law, StepMap, without_errors};
 use upright_design::plant::ChainParameters;
 use upright_design::reality::hanging_by_hand;
 use upright_design::rig::{Actuator, Chain, Motor, Rig};
 use upright_design::simulate::{Bench, Scenario};
-use upright_design::table::{NoTable, step_map};
+use upright_design::table::{NoTable, sensor_rows, step_map};
 
 use crate::cart_force::CartForce;
 use crate::channel::chain_of;
@@ -275,6 +275,7 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
         .largest_force_n()
         .unwrap_or(10.0 * excitation.amplitude_n * excitation.lines.len() as f64);
     let mut shaking = ShakingDrive::of(rig, full_n)?;
+    let rows = sensor_rows(rig);
     let mut log = Log::new(LogHeader {
         rig: rig.name.clone(),
         hash: rig.hash(),
@@ -287,6 +288,7 @@ fn run(rig: &Rig, machine: &Rig, excitation: &Excitation, seed: u64) -> Result<O
     let mut speed = Speed::new(period_s);
     for number in 0..(excitation.duration_s / period_s) as u32 {
         bench.read_counters(&mut counters);
+        without_errors(&rows, &mut counters);
         let counts: Vec<u16> =
             counters.iter().zip(&at_zero).map(|(count, zero)| count.wrapping_sub(*zero) as u16).collect();
         let x = f64::from(Bench::signed(0, counters[0]) as i32) * steps[0];

@@ -1,5 +1,6 @@
 //! What is identified: the parameters of a chain, their start values from the rig file, and their prior deviations.
 
+use upright::boards::parts::PARTS;
 use upright_design::plant::ChainParameters;
 use upright_design::reality::PRESLIDING_PER_DEFLECTION;
 use upright_design::rig::{Chain, LinkEncoder, Rig, SensorErrors};
@@ -327,7 +328,10 @@ pub(crate) fn periodic(sensors: &SensorErrors, joint: usize, harmonic: usize, pa
 fn periodic_deviations(chain: &Chain, joint: usize, eccentricity: bool) -> [f64; 2] {
     match chain.links[joint].encoder {
         Some(LinkEncoder::Absolute { travel_rad: Some(travel_rad), .. }) => [LINEARITY * travel_rad; 2],
-        Some(LinkEncoder::Absolute { .. }) => [MAGNET_RAD, MAGNET_TWICE_RAD],
+        Some(LinkEncoder::Absolute { .. }) => {
+            let row = chain.links[joint].part.and_then(|number| PARTS.get(number));
+            row.map_or([MAGNET_RAD, MAGNET_TWICE_RAD], |row| row.error_rad)
+        }
         _ if eccentricity => [ECCENTRICITY_RAD, ENCODER_TWICE_RAD],
         _ => [0.0; 2],
     }

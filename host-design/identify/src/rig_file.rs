@@ -3,7 +3,12 @@
 use std::path::Path;
 
 use upright_design::number::rounded;
-use upright_design::rig::{MEASUREMENTS_OF_A_LINK, ParameterErrors, PerJoint, Rig, RigError, RigText};
+use upright_design::reality::sum_of_sines;
+#[cfg(doc)]
+use upright_design::rig::TurnErrors;
+use upright_design::rig::{
+    MEASUREMENTS_OF_A_LINK, ParameterErrors, PerJoint, Rig, RigError, RigText, SensorErrors,
+};
 
 use crate::estimated::Identification;
 use crate::parameters::ParameterKind;
@@ -100,40 +105,81 @@ fn sensors(rig: &Rig, found: &Identification) -> Vec<(String, String)> {
     {
         values.push((key.to_owned(), number(travel * step_m)));
     }
-    let file = &rig.reality.sensors;
-    type Parts = [fn(usize) -> ParameterKind; 2];
-    let harmonics: [(Parts, [(&str, &PerJoint); 2]); 2] = [
-        (
-            [ParameterKind::EccentricSine, ParameterKind::EccentricCosine],
-            [
-                ("eccentricity_rad", &file.eccentricity_rad),
-                ("eccentricity_phase_rad", &file.eccentricity_phase_rad),
-            ],
-        ),
-        (
-            [ParameterKind::TwiceSine, ParameterKind::TwiceCosine],
-            [
-                ("twice_per_turn_rad", &file.twice_per_turn_rad),
-                ("twice_per_turn_phase_rad", &file.twice_per_turn_phase_rad),
-            ],
-        ),
-    ];
-    for ([sine, cosine], keys) in harmonics {
-        let polar = |joint: usize| {
-            let (sine, cosine) = (of(sine(joint))?, of(cosine(joint))?);
-            Some([sine.hypot(cosine), libm::atan2(cosine, sine)])
+    for harmonic in [&ONCE, &TWICE] {
+        values.extend(errors_per_turn(rig, harmonic, &of));
+    }
+    values
+}
+
+/// An error of the sensors once or twice per turn.
+struct Harmonic {
+    /// The parameters that are the parts of it which follow the sine and the cosine.
+    parts: [fn(usize) -> ParameterKind; 2],
+    /// Amplitude and phase of the simulated machine.
+    real: [(&'static str, fn(&SensorErrors) -> &PerJoint); 2],
+    /// Keys of those that are taken out of the readings of a part, and its place in [`TurnErrors::harmonics`].
+    taken_out: [&'static str; 2],
+    place: usize,
+}
+
+static ONCE: Harmonic = Harmonic {
+    parts: [ParameterKind::EccentricSine, ParameterKind::EccentricCosine],
+    real: [
+        ("eccentricity_rad", |errors| &errors.eccentricity_rad),
+        ("eccentricity_phase_rad", |errors| &errors.eccentricity_phase_rad),
+    ],
+    taken_out: ["sensor_once_per_turn_rad", "sensor_once_per_turn_phase_rad"],
+    place: 0,
+};
+
+static TWICE: Harmonic = Harmonic {
+    parts: [ParameterKind::TwiceSine, ParameterKind::TwiceCosine],
+    real: [
+        ("twice_per_turn_rad", |errors| &errors.twice_per_turn_rad),
+        ("twice_per_turn_phase_rad", |errors| &errors.twice_per_turn_phase_rad),
+    ],
+    taken_out: ["sensor_twice_per_turn_rad", "sensor_twice_per_turn_phase_rad"],
+    place: 1,
+};
+
+/// Keys and values of an error per turn. That of a part is added to what is taken out of its readings, because a log
+/// has them without it, and is then none of the simulated machine's.
+fn errors_per_turn(
+    rig: &Rig,
+    harmonic: &Harmonic,
+    of: &dyn Fn(ParameterKind) -> Option<f64>,
+) -> Vec<(String, String)> {
+    let number = |value: f64| rounded(value, 6).to_string();
+    let [sine, cosine] = harmonic.parts;
+    let polar = |joint: usize| {
+        let (sine, cosine) = (of(sine(joint))?, of(cosine(joint))?);
+        Some([sine.hypot(cosine), libm::atan2(cosine, sine)])
+    };
+    let links = rig.chain().map(|chain| chain.links.as_slice()).unwrap_or_default();
+    let found: Vec<Option<[f64; 2]>> = (0..links.len()).map(polar).collect();
+    let mut values = Vec::new();
+    for ((joint, link), found) in links.iter().enumerate().zip(&found) {
+        let (Some(_), Some(found)) = (link.part, found) else { continue };
+        let all = sum_of_sines(*found, link.errors.harmonics()[harmonic.place]);
+        let keys = harmonic.taken_out.iter().zip(all);
+        values.extend(keys.map(|(key, value)| (format!("link[{}].{key}", joint + 1), number(value))));
+    }
+    let is_real = |joint: usize| links[joint].part.is_none();
+    // Without any, the file needs no keys for it, unless it has some.
+    let is_given = harmonic.real[0].1(&rig.reality.sensors).is_any();
+    if !found.iter().enumerate().any(|(joint, found)| found.is_some() && (is_real(joint) || is_given)) {
+        return values;
+    }
+    for (place, (key, file)) in harmonic.real.into_iter().enumerate() {
+        let one = |(joint, found): (usize, &Option<[f64; 2]>)| {
+            number(match found {
+                Some(_) if !is_real(joint) => 0.0,
+                Some(found) => found[place],
+                None => file(&rig.reality.sensors).of_joint(joint),
+            })
         };
-        let found: Vec<Option<[f64; 2]>> = (0..rig.links()).map(polar).collect();
-        if found.iter().all(Option::is_none) {
-            continue;
-        }
-        for (part, (key, file)) in keys.into_iter().enumerate() {
-            let one = |(joint, found): (usize, &Option<[f64; 2]>)| {
-                number(found.map_or(file.of_joint(joint), |found| found[part]))
-            };
-            let all: Vec<String> = found.iter().enumerate().map(one).collect();
-            values.push((format!("reality.{key}"), format!("[{}]", all.join(", "))));
-        }
+        let all: Vec<String> = found.iter().enumerate().map(one).collect();
+        values.push((format!("reality.{key}"), format!("[{}]", all.join(", "))));
     }
     values
 }

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::SwingUpError;
 use super::problem::Knots;
-use upright_design::rig::{LinkEncoder, Rig};
+use upright_design::rig::{LinkEncoder, Rig, TurnErrors};
 
 /// Both motions as they are stored in the file beside the rig file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -77,7 +77,7 @@ pub(crate) fn header(rig: &str, hash: &str) -> String {
 pub(crate) fn request_hash(rig: &Rig) -> String {
     let mut rig = rig.clone();
     for link in rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links) {
-        link.sensor_delay_s = 0.0;
+        (link.sensor_delay_s, link.part, link.errors) = (0.0, None, TurnErrors::default());
         if let Some(LinkEncoder::Absolute { zero_counts, travel_rad: None, .. }) = &mut link.encoder {
             *zero_counts = 0;
         }

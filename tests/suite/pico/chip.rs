@@ -9,6 +9,9 @@ use serde_json::{Value, json};
 use super::recorded::{Recorded, steps};
 use crate::equipment::if_possible;
 use upright::boards::named;
+use upright::boards::parts::PartInterface;
+use upright::protocol::simulated_pins::BAD_SAMPLE;
+use upright::table::SensorRow;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_test_support::equipment::{is_required, not_exercised};
@@ -112,6 +115,7 @@ impl Chip {
             }
             json!({
                 "counts": counts,
+                "registers": registers(run, &pins.raw_counts),
                 "limitLow": pins.contacts.limit_low,
                 "limitHigh": pins.contacts.limit_high,
                 "stop": pins.contacts.emergency_stop,
@@ -161,6 +165,20 @@ impl Chip {
         let cycles = |name| stopped[name].as_u64().unwrap_or_else(|| panic!("{stopped}")) as u32;
         (["disabled", "reset"].map(cycles), stopped["pulse"].as_i64().unwrap())
     }
+}
+
+/// Registers of the sensors on two wires with these readings; null for an encoder. A `run` may spoil one.
+fn registers(run: &Recorded, raw_counts: &[u32]) -> Vec<Value> {
+    let of = |(row, &count): (&SensorRow, &u32)| match (row.kind.interface(), row.kind.reading()) {
+        (Some(PartInterface::TwoWires(part)), Some(reading)) => {
+            let is_bad = count & BAD_SAMPLE != 0;
+            let angle = (count & ((1 << reading.bits) - 1)) as u16;
+            let values = part.registers(if is_bad { None } else { Some(angle) });
+            json!({ "address": part.address, "first": part.register, "values": values.as_slice() })
+        }
+        _ => Value::Null,
+    };
+    run.sensors.iter().zip(raw_counts).map(of).collect()
 }
 
 fn bytes(digits: &Value) -> Vec<u8> {

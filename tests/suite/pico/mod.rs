@@ -6,6 +6,7 @@ mod arithmetic;
 mod chip;
 pub(crate) mod recorded;
 mod stepper;
+mod two_wires;
 
 use self::chip::{Answer, Chip, uf2_with_motions};
 use self::recorded::{PERIOD, Recorded, WARM_UP_TICKS, recorded, recorded_while};

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use upright::board::Output;
 use upright::supervision::supervisor::State;
+use upright::table::SensorRow;
 use upright_closed_loop::client::{AnyTelemetry, Client, Received};
 use upright_closed_loop::harness::{HarnessError, Pace, Pins, Target, healthy, record, with_firmware};
 use upright_design::rig::Rig;
@@ -19,6 +20,8 @@ const VOLTS_PER_STEP: f32 = 3.3 * 11.0 / 4096.0;
 
 /// A recorded run.
 pub(crate) struct Recorded {
+    /// How the sensors are read.
+    pub(crate) sensors: Vec<SensorRow>,
     pub(crate) pins: Vec<Pins>,
     pub(crate) outputs: Vec<Output>,
     /// What the firmware has sent, by the tick in which it had been sent.
@@ -117,7 +120,8 @@ pub(crate) fn recorded_while<D: FnMut(&mut Pins)>(
     defect: Option<(State, usize, D)>,
     act: impl FnOnce(&mut dyn Target),
 ) -> Recorded {
-    let run = Recorded { pins: Vec::new(), outputs: Vec::new(), sent: Vec::new() };
+    let sensors = table.rows().to_vec();
+    let run = Recorded { sensors, pins: Vec::new(), outputs: Vec::new(), sent: Vec::new() };
     with_firmware(table, |target| {
         let mut tap = Tap {
             target,

@@ -5,12 +5,13 @@ use hal::pac::pio0::RegisterBlock;
 use hal::pac::{PIO0, PIO1};
 
 use super::pins::{ENCODERS, GIVES_PULSES};
+use super::sensors::ON_BUS;
 use super::state_machine::{Course, load, run, start};
 
 const _: () = assert!(SENSORS <= ENCODERS.len(), "the board counts fewer encoders than the rig has");
 
-/// The first encoder: pulses tell where the cart is that they move.
-const FIRST: usize = GIVES_PULSES as usize;
+/// The sensors that count edges: pulses tell where the cart is that they move, and absolute sensors read an angle.
+const COUNT_EDGES: u32 = ((1 << SENSORS) - 1) & !(GIVES_PULSES as u32) & !ON_BUS;
 
 /// The length of the program: what follows it is free.
 pub(super) const LENGTH: usize = COUNT.len();
@@ -70,7 +71,10 @@ impl Encoders {
     pub(super) fn set_up(first: &PIO0, second: &PIO1) -> Self {
         load(first, 0, &COUNT);
         load(second, 0, &COUNT);
-        for (encoder, &phase_b) in ENCODERS.iter().enumerate().take(SENSORS).skip(FIRST) {
+        for (encoder, &phase_b) in ENCODERS.iter().enumerate().take(SENSORS) {
+            if COUNT_EDGES & 1 << encoder == 0 {
+                continue;
+            }
             let (pio, number) = machine(encoder);
             let course = Course { begin: UPDATE.into(), repeat: UPDATE.into(), last: 23, divider: 1 };
             start(pio, number, course, (phase_b as u32) << 15, 0, &[ZERO]);
@@ -78,10 +82,10 @@ impl Encoders {
         Self { have_stopped: false }
     }
 
-    /// The counts, as of now; 0 for a cart without an encoder.
+    /// The counts, as of now; 0 for a sensor that is no encoder.
     pub(super) fn raw_counts(&mut self) -> [u32; SENSORS] {
         core::array::from_fn(|encoder| {
-            if encoder < FIRST {
+            if COUNT_EDGES & 1 << encoder == 0 {
                 return 0;
             }
             let (pio, number) = machine(encoder);
@@ -96,8 +100,7 @@ impl Encoders {
 
     /// Whether a state machine has not counted in time, or is off.
     pub(super) fn have_stopped(&self) -> bool {
-        let in_first = (1 << SENSORS.min(4)) - (1 << FIRST);
-        let in_second = u32::from(SENSORS > 4);
+        let [in_first, in_second] = [COUNT_EDGES & 0xf, COUNT_EDGES >> 4];
         self.have_stopped | !run(machine(0).0, in_first) | !run(machine(4).0, in_second)
     }
 }

@@ -3,6 +3,7 @@
 
 #![allow(unsafe_code)]
 
+mod angles;
 #[cfg(not(rp2350))]
 mod arithmetic;
 mod chip;
@@ -14,6 +15,7 @@ mod guard;
 mod memory;
 mod motor;
 mod pins;
+mod sensors;
 mod state_machine;
 mod steps;
 mod stop;
@@ -27,11 +29,12 @@ use hal::clocks::init_clocks_and_plls;
 use hal::fugit::MicrosDurationU32;
 use hal::pac::{Interrupt, Peripherals};
 use hal::watchdog::Watchdog;
-use upright::board::{Board, Contacts, Inputs, Output};
+use upright::board::{BadSamples, Board, Contacts, Inputs, Output};
 pub(crate) use upright::boards::rp::TICK_US;
 use upright::control::encoder::CounterWidth;
 use upright::protocol::message::Start;
 
+use angles::Angles;
 pub(crate) use chip::CLOCK_HZ;
 use encoders::Encoders;
 pub(crate) use memory::tables;
@@ -48,6 +51,9 @@ const CRYSTAL_HZ: u32 = 12_000_000;
 /// The pins and peripherals of the control task.
 pub(crate) struct Hardware {
     encoders: Encoders,
+    /// One, if the rig has absolute sensors.
+    angles: [Angles; sensors::ARE_THERE as usize],
+    bad: [BadSamples<SENSORS>; sensors::ARE_THERE as usize],
     motor: Motor,
     supply: Supply,
     watchdog: Watchdog,
@@ -93,6 +99,8 @@ pub(crate) fn set_up(
     pins::set_status_led(true);
     let hardware = Hardware {
         encoders,
+        angles: core::array::from_fn(|_| Angles::set_up()),
+        bad: core::array::from_fn(|_| BadSamples::default()),
         motor,
         supply,
         watchdog,
@@ -125,6 +133,9 @@ impl Board<SENSORS> for Hardware {
         // Clears the flag of the current tick.
         let _ = tick_is_due();
         let mut raw_counts = self.encoders.raw_counts();
+        if let ([angles], [bad]) = (self.angles.as_mut_slice(), self.bad.as_mut_slice()) {
+            bad.now = angles.read(&mut raw_counts);
+        }
         if let Some(pulses) = self.motor.pulses() {
             raw_counts[0] = pulses;
         }
@@ -146,6 +157,10 @@ impl Board<SENSORS> for Hardware {
                 board_fault: self.encoders.have_stopped() | self.motor.has_failed(),
             },
         }
+    }
+
+    fn bad_samples(&mut self) -> Option<&mut BadSamples<SENSORS>> {
+        self.bad.first_mut()
     }
 
     fn tick_s(&self) -> f32 {

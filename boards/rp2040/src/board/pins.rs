@@ -4,6 +4,7 @@ use hal::pac::{IO_BANK0, PADS_BANK0, RESETS, SIO};
 use upright::boards::rp;
 
 use super::chip::BLOCKS;
+use super::sensors::ARE_THERE;
 use crate::gains::TABLE;
 
 /// Whether the drive of the gain table takes pulses.
@@ -21,6 +22,8 @@ const LIMIT_HIGH: usize = 14;
 pub(super) const EMERGENCY_STOP: usize = 15;
 /// Low while the power stage reports a fault.
 const DRIVER_FAULT: usize = 16;
+/// Clock of absolute sensors.
+pub(super) const ANGLE_CLOCK: usize = 17;
 const STATUS_LED: usize = 25;
 const SUPPLY: usize = 26;
 
@@ -59,6 +62,12 @@ pub(super) fn set_up(resets: &RESETS, pads: &PADS_BANK0, functions: &IO_BANK0) {
     sio().gpio_out_clr().write(|w| unsafe { w.bits(1 << DIRECTION | 1 << STATUS_LED) });
     sio().gpio_oe_set().write(|w| unsafe { w.bits(1 << DIRECTION | 1 << STATUS_LED) });
     set(DIRECTION, PULLED_DOWN, if GIVES_PULSES { FUNCTION_PIO0 } else { FUNCTION_SIO });
+    if ARE_THERE {
+        // Data wires are pulled low by their output, which is low and off at first.
+        sio().gpio_out_set().write(|w| unsafe { w.bits(1 << ANGLE_CLOCK) });
+        sio().gpio_oe_set().write(|w| unsafe { w.bits(1 << ANGLE_CLOCK) });
+        set(ANGLE_CLOCK, FLOATING, FUNCTION_SIO);
+    }
     set(STATUS_LED, FLOATING, FUNCTION_SIO);
     set(PWM, PULLED_DOWN, if GIVES_PULSES { FUNCTION_PIO0 } else { FUNCTION_PWM });
     set(ENABLE, PULLED_DOWN, FUNCTION_PIO1);
@@ -96,6 +105,25 @@ pub(super) fn was_reported() -> [bool; 2] {
     let was_stopped = noted(edge(EMERGENCY_STOP, true));
     let was_faulty = noted(edge(DRIVER_FAULT, false));
     [was_stopped | is_high(EMERGENCY_STOP), was_faulty | !is_high(DRIVER_FAULT)]
+}
+
+/// Sets the clock of the absolute sensors.
+pub(super) fn set_clock(is_high: bool) {
+    set_output(ANGLE_CLOCK, is_high);
+}
+
+/// Pulls these pins low, and leaves those alone.
+pub(super) fn pull(low: u32, alone: u32) {
+    // SAFETY: any bits of pins whose output is low.
+    unsafe {
+        sio().gpio_oe_set().write(|w| w.bits(low));
+        sio().gpio_oe_clr().write(|w| w.bits(alone));
+    }
+}
+
+/// Levels of all pins.
+pub(super) fn levels() -> u32 {
+    sio().gpio_in().read().bits()
 }
 
 /// Sets the direction; high is along +x.

@@ -21,8 +21,9 @@ use crate::peripherals::rcc::{Crystal, Rcc};
 use crate::peripherals::usart::Usart;
 use crate::processor::flash_cache::FlashCache;
 use crate::processor::system::System;
+use crate::register_sensor::RegisterSensor;
 use crate::timing::CoreTiming;
-use crate::wiring::BoardWiring;
+use crate::wiring::{BoardWiring, Pin};
 
 /// Number of ports, A to I.
 pub(crate) const PORTS: usize = 9;
@@ -128,6 +129,8 @@ pub(crate) struct Bus {
     pub(crate) encoders: [EncoderTimer; 5],
     pub(crate) shafts: Vec<Shaft>,
     angle_sensors: Vec<AngleSensor>,
+    /// Those on two wires, by their data wires.
+    register_sensors: Vec<(Pin, RegisterSensor)>,
     capture: CaptureTimer,
     pub(crate) adc: Adc,
     pub(crate) usart: Usart,
@@ -193,6 +196,7 @@ impl Bus {
             encoders: [true, false, false, true, false].map(EncoderTimer::new),
             shafts,
             angle_sensors: Vec::new(),
+            register_sensors: Vec::new(),
             capture: CaptureTimer::new(),
             adc: Adc::default(),
             usart: Usart::new(),

@@ -7,6 +7,7 @@ use crate::error::Violation;
 use crate::peripherals::encoder_timer::Shaft;
 use crate::peripherals::gpio::ExternalLevel;
 use crate::peripherals::rcc::Domain;
+use crate::register_sensor::{RegisterDefect, RegisterSensor};
 use crate::wiring::{BREAK_PINS, COMPLEMENTARY_PINS, ENCODER_INPUTS, PWM_PINS, Pin, SERIAL_PINS};
 
 impl Bus {
@@ -49,8 +50,50 @@ impl Bus {
         self.angle_sensors.get_mut(place)
     }
 
+    /// Sets the registers of the sensor on two wires in the place of an encoder; connected, if it is not yet.
+    pub(crate) fn register_sensor(&mut self, encoder: usize, address: u8, first: u8, values: [u8; 5]) {
+        let Some(&(data, _)) = self.wiring.encoders.get(encoder) else { return };
+        match self.register_sensors.iter_mut().find(|(at, _)| *at == data) {
+            Some((_, sensor)) => sensor.set_values(values),
+            None => self.register_sensors.push((data, RegisterSensor::new(address, first, values))),
+        }
+        self.show_registers();
+    }
+
+    /// Begins a defect of that sensor.
+    pub(crate) fn spoil_registers(&mut self, encoder: usize, defect: RegisterDefect) {
+        let Some(&(data, _)) = self.wiring.encoders.get(encoder) else { return };
+        if let Some((_, sensor)) = self.register_sensors.iter_mut().find(|(at, _)| *at == data) {
+            sensor.set_defect(defect);
+        }
+        self.show_registers();
+    }
+
+    /// The data wires as their sensors leave them: pulled up outside the chip, as the bus needs.
+    fn show_registers(&mut self) {
+        for (data, sensor) in &self.register_sensors {
+            let level = if sensor.pulls() { ExternalLevel::Low } else { ExternalLevel::High };
+            self.ports[data.port].wires[usize::from(data.number)] = level;
+        }
+    }
+
+    fn register_sensors_hear(&mut self) -> Result<(), Violation> {
+        let Some([_, clock, _]) = self.wiring.angle_bus.filter(|_| !self.register_sensors.is_empty()) else {
+            return Ok(());
+        };
+        let clock = self.output_level(clock);
+        for (data, sensor) in &mut self.register_sensors {
+            let port = &self.ports[data.port];
+            let is_pulled = port.mode_of(data.number) == 1 && port.output >> data.number & 1 == 0;
+            sensor.hear(clock, !is_pulled, self.now)?;
+        }
+        self.show_registers();
+        Ok(())
+    }
+
     /// The absolute sensors hear the outputs, and drive their data wires.
     pub(super) fn angle_sensors_hear(&mut self) -> Result<(), Violation> {
+        self.register_sensors_hear()?;
         let Some(pins) = self.wiring.angle_bus.filter(|_| !self.angle_sensors.is_empty()) else {
             return Ok(());
         };

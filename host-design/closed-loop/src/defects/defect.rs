@@ -114,9 +114,9 @@ defects! {
     SensorDead Nothing "an absolute sensor reads 0 or all ones: its wire is open, or it has lost its magnet" => Off(10);
     SensorBit Nothing "a bit of an absolute sensor's reading is wrong in one of 5 to 50 ticks" => Bounded;
     SampleInvalid SimulatedPins "a board knows that all readings of an absolute sensor are bad" => Fault(F::Encoder, Exactly(3));
-    SensorWire Board "the data wire of an absolute sensor is open, or has a short circuit" => Fault(F::Encoder, Exactly(3));
+    SensorWire Board "the data wire of an absolute sensor is open, or has a short circuit, or it does not answer at its address" => Fault(F::Encoder, Exactly(3));
     MagnetMissing Board "the magnet of an absolute sensor is missing, which the sensor says" => Fault(F::Encoder, Exactly(3));
-    FrameBit Board "a bit of an absolute sensor's frame, parity and error flag included, is wrong in one of 5 to 50 ticks" => Counted;
+    FrameBit Board "a bit of an absolute sensor's frame, parity and error flag included, is wrong in one of 5 to 50 ticks; one on two wires holds its data wire" => Counted;
 }
 
 impl Defect {

@@ -3,6 +3,7 @@
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use upright::board::Output;
+use upright::boards::parts::PartInterface;
 use upright::control::actuator::Drive;
 use upright::control::encoder::{AbsoluteSensor, is_at_end};
 use upright::protocol::frame::DELIMITER;
@@ -59,7 +60,7 @@ struct AbsoluteReading {
     /// Its counter for a count of 0.
     at_zero: u32,
     /// Whether its counter is its reading, which is bad at the ends of the range.
-    is_potentiometer: bool,
+    is_analog: bool,
 }
 
 impl AbsoluteReading {
@@ -69,18 +70,18 @@ impl AbsoluteReading {
         let bits = kind.reading().map_or(0, |reading| reading.bits);
         let mut board = AbsoluteSensor::new(bits);
         let at_zero = counter.wrapping_sub(board.count(counter & ((1 << bits) - 1)));
-        Self { sensor: board, bits, at_zero, is_potentiometer: kind.is_potentiometer() }
+        Self { sensor: board, bits, at_zero, is_analog: kind.interface() == Some(PartInterface::Analog) }
     }
 
     /// The counter for a reading, of which only the bits that the sensor has are taken.
     fn counter(&mut self, reading: u32) -> u32 {
         let reading = reading & ((1 << self.bits) - 1);
-        if self.is_potentiometer { reading } else { self.at_zero.wrapping_add(self.sensor.count(reading)) }
+        if self.is_analog { reading } else { self.at_zero.wrapping_add(self.sensor.count(reading)) }
     }
 
     /// Whether a board knows that this counter is bad.
     fn knows_bad(&self, counter: u32) -> bool {
-        self.is_potentiometer && is_at_end(counter, self.bits)
+        self.is_analog && is_at_end(counter, self.bits)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use upright::boards::parts::PartInterface;
 use upright::table::Law;
 
 use super::defect::Defect;
@@ -64,13 +65,20 @@ impl Defect {
 
     /// Whether this sensor can have it, which not every sensor has.
     fn can_have(self, table: &TableValues, sensor: usize) -> bool {
-        let kind = table.sensors[sensor].kind;
+        let interface = table.sensors[sensor].kind.interface();
         if self == Self::EncoderWireOpen {
-            return sensor >= first_encoder(table) && !kind.is_absolute();
+            return sensor >= first_encoder(table) && interface.is_none();
         }
         // Simulated pins have no room for a mark beside the cart's counter of 32 bits.
         let is_not_shown = sensor == 0 && self == Self::SampleInvalid;
-        kind.is_absolute() && !is_not_shown && !(self.is_of_frames() && kind.is_potentiometer())
+        interface.is_some_and(|interface| {
+            !is_not_shown
+                && match interface {
+                    PartInterface::Analog => !self.is_of_frames(),
+                    PartInterface::TwoWires(part) => self != Self::MagnetMissing || part.has_state(),
+                    PartInterface::Frames => true,
+                }
+        })
     }
 }
 

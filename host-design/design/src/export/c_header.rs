@@ -25,6 +25,12 @@ const CALLS: &str = include_str!("calls.h");
 /// Why a rig cannot have a C header.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoHeader {
+    /// The header does not take the errors of a sensor out.
+    #[error(
+        "a C header takes no errors per turn out of a sensor's readings: leave sensor_once_per_turn_rad and \
+         sensor_twice_per_turn_rad out, and take them out in your program"
+    )]
+    TurnErrors,
     /// Without an observer, the controller would need every speed measured.
     #[error(
         "a C header computes the speeds from encoder counts, and this rig has no observer: give it [kalman], and encoders \
@@ -39,6 +45,9 @@ pub enum NoHeader {
 /// [`NoHeader`] if the controller in C cannot serve this rig.
 pub fn c_header(rig: &Rig, table: &TableValues) -> Result<String, NoHeader> {
     let observer = table.observer.as_ref().ok_or(NoHeader::NoObserver)?;
+    if rig.chain().is_some_and(|chain| chain.links.iter().any(|link| !link.errors.are_none())) {
+        return Err(NoHeader::TurnErrors);
+    }
     let name = plain(&rig.name);
     let title = format!("Controller of the rig \"{name}\", written by `upright export --c`; do not edit.");
     let steps = if table.drive.pulses().is_some() { STEPS } else { "" };

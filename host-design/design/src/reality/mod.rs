@@ -27,7 +27,7 @@ mod tolerated;
 pub use belt::{Belt, Rotor};
 pub use bristle::{Bristle, Contact, PRESLIDING_PER_DEFLECTION};
 pub use driver::Driver;
-pub use encoders::{RealEncoders, hanging_by_hand};
+pub use encoders::{RealEncoders, hanging_by_hand, sum_of_sines};
 pub use machine::{RealChain, ideal_chain, real_plant};
 pub use parameters::real_chain;
 pub use step_motor::StepMotor;

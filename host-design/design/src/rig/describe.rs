@@ -5,6 +5,8 @@
 use std::f64::consts::TAU;
 use std::fmt::Display;
 
+use upright::boards::parts::PARTS;
+
 use crate::number::significant;
 
 use super::base::Base;
@@ -248,6 +250,12 @@ impl Description {
                 self.row(&LINK, given("sensor_noise_rad"), &[noise_rad]);
             }
             None => self.note("encoder step", "none"),
+        }
+        if let Some(row) = link.part.and_then(|number| PARTS.get(number)) {
+            self.note("sensor", row.name);
+        }
+        if !link.errors.are_none() {
+            self.rows(&LINK, &link.errors);
         }
         if link.sensor_delay_s > 0.0 {
             self.row(&LINK, given("sensor_delay_s"), &[link.sensor_delay_s]);

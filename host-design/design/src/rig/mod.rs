@@ -58,7 +58,7 @@ pub use sections::imperfections::{Allowance, IMPERFECTIONS, Imperfection, Larges
 pub use sections::integral::Integral;
 pub use sections::kalman::KalmanNoise;
 pub use sections::limits::Limits;
-pub use sections::link::{Link, LinkEncoder, MEASUREMENTS_OF_A_LINK};
+pub use sections::link::{Link, LinkEncoder, MEASUREMENTS_OF_A_LINK, TurnErrors};
 pub use sections::lqr::Lqr;
 pub use sections::model::LinearPlant;
 pub use sections::pole_placement::PolePlacement;

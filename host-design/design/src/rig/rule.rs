@@ -80,8 +80,8 @@ impl Rule {
         Rule { accepts: "a number >= 2", admits: |x| x.iter().all(|&x| x >= 2.0) };
     /// Bits of an absolute sensor.
     pub(super) const BITS: Rule = Rule {
-        accepts: "a whole number from 12 to 18",
-        admits: |x| x.iter().all(|&x| (12.0..=18.0).contains(&x) && x.fract() == 0.0),
+        accepts: "a whole number from 10 to 18",
+        admits: |x| x.iter().all(|&x| (10.0..=18.0).contains(&x) && x.fract() == 0.0),
     };
     /// Angle that a potentiometer reads.
     pub(super) const TRAVEL: Rule = Rule {

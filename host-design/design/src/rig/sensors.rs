@@ -6,7 +6,7 @@ use upright::control::encoder::{AbsoluteSensor, is_at_end};
 
 use super::description::Rig;
 use super::sections::chain::{Cart, PlantDescription};
-use super::sections::link::LinkEncoder;
+use super::sections::link::{LinkEncoder, TurnErrors};
 use crate::numerics::{Matrix, Real};
 
 /// A sensor that measures one state in discrete steps.
@@ -20,6 +20,8 @@ pub struct Sensor {
     pub absolute: Option<AbsoluteRange>,
     /// Age of its reading at the tick (s).
     pub delay_s: f64,
+    /// Number of the part that it is, in [`PARTS`](upright::boards::parts::PARTS), and its errors per turn.
+    pub part: Option<(usize, TurnErrors)>,
     resolution: Resolution,
 }
 
@@ -80,7 +82,14 @@ enum Resolution {
 impl Sensor {
     /// A sensor of this state that counts steps of this size.
     const fn of_step(state: usize, step: f64) -> Self {
-        Self { state, noise: 0.0, absolute: None, delay_s: 0.0, resolution: Resolution::Step(step) }
+        Self {
+            state,
+            noise: 0.0,
+            absolute: None,
+            delay_s: 0.0,
+            part: None,
+            resolution: Resolution::Step(step),
+        }
     }
 
     fn of_cart(cart: &Cart, step_m: f64) -> Self {
@@ -169,7 +178,8 @@ impl Rig {
                     step_m.or(chain.cart.encoder_step_m).map(|step| Sensor::of_cart(&chain.cart, step));
                 let links = chain.links.iter().enumerate().filter_map(|(link, description)| {
                     let sensor = Sensor::of_link(2 + 2 * link, description.encoder?);
-                    Some(Sensor { delay_s: description.sensor_delay_s, ..sensor })
+                    let part = description.part.map(|number| (number, description.errors));
+                    Some(Sensor { delay_s: description.sensor_delay_s, part, ..sensor })
                 });
                 cart.into_iter().chain(links).collect()
             }

@@ -9,7 +9,7 @@ use upright::supervision::debounce::Debounce;
 use upright::supervision::detection::Detection;
 use upright::supervision::envelope;
 use upright::supervision::fault::Fault;
-use upright::table::{GainTable, Law};
+use upright::table::{GainTable, Law, without_errors};
 
 use super::bench::Bench;
 use super::error::SimulationError;
@@ -68,7 +68,7 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
 
     fn home_and_start(&mut self, at_zero: &[u32], counters: &[u32]) -> Result<(), Rejected> {
         self.controller.encoders_mut().home(array(at_zero), &[0; NY]);
-        self.controller.start(array(counters))
+        self.controller.start(&read(self.table, counters))
     }
 
     fn start_in_state(&mut self, state: &[f32]) {
@@ -81,10 +81,10 @@ impl<const NX: usize, const NY: usize> AnyController for SupervisedController<'_
 
     fn control(&mut self, counters: &[u32]) -> MotorCommand {
         let Some(BalancingSupervision { detection, .. }) = &mut self.supervision else {
-            return self.controller.control(array(counters));
+            return self.controller.control(&read(self.table, counters));
         };
         let mut found = None;
-        let command = self.controller.control_with(array(counters), |counts, y, e| {
+        let command = self.controller.control_with(&read(self.table, counters), |counts, y, e| {
             found = detection.test(&self.table.thresholds, counts, y, e);
         });
         self.judge(&command, found.map(|finding| finding.fault));
@@ -145,6 +145,13 @@ impl<const NX: usize, const NY: usize> SupervisedController<'_, NX, NY> {
 /// `state`, and 0 for states beyond it.
 fn padded<const NX: usize>(state: &[f32]) -> SVector<f32, NX> {
     SVector::from_fn(|row, _| state.get(row).copied().unwrap_or_default())
+}
+
+/// What the firmware makes of the readings of the counters.
+fn read<const NX: usize, const NY: usize>(table: &GainTable<NX, NY>, counters: &[u32]) -> [u32; NY] {
+    let mut read = *array(counters);
+    without_errors(&table.sensors, &mut read);
+    read
 }
 
 fn array<const N: usize>(counters: &[u32]) -> &[u32; N] {

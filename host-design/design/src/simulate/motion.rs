@@ -3,7 +3,9 @@
 use upright::control::controller::Controller;
 use upright::control::motion::Playback;
 use upright::supervision::detection::Detection;
-use upright::table::{Equilibrium, MotionTable, SwingUp, SwingUpTable, Thresholds};
+use upright::table::{
+    Equilibrium, MotionTable, SensorRow, SwingUp, SwingUpTable, Thresholds, without_errors,
+};
 
 use super::bench::Bench;
 use super::error::SimulationError;
@@ -115,10 +117,11 @@ impl WithSize for Follow<'_> {
         let mut at_zero = [0; NY];
         self.bench.read_counters_at_zero(&mut at_zero);
         controller.encoders_mut().home(&at_zero, &[0; NY]);
-        controller.start(&self.bench.counters())?;
+        controller.start(&read(&mut self.bench, &table.sensors))?;
         let tick_s = table.tick_s;
         let mut run = MotionRun {
             controller,
+            sensors: &table.sensors,
             swing_up: &swing_up,
             bench: self.bench,
             tick_s,
@@ -139,8 +142,16 @@ impl WithSize for Follow<'_> {
     }
 }
 
+/// What the firmware makes of the readings of the counters.
+fn read<const NY: usize>(bench: &mut Bench, sensors: &[SensorRow; NY]) -> [u32; NY] {
+    let mut counters = bench.counters();
+    without_errors(sensors, &mut counters);
+    counters
+}
+
 struct MotionRun<'t, const NX: usize, const NY: usize, const N: usize> {
     controller: Controller<'t, NX, NY>,
+    sensors: &'t [SensorRow; NY],
     swing_up: &'t SwingUpTable<'t, NY, N>,
     bench: Bench,
     tick_s: f32,
@@ -151,13 +162,13 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> MotionRun<'t, NX, NY,
     /// Follows `motion` from the set-point, with the tests of the supervisor but without its thresholds, stays at its
     /// end for `hold_ticks`, and then hands over to the control law.
     fn follow(&mut self, motion: MotionTable<'t>, hold_ticks: usize) {
-        let Self { controller, bench, reached, .. } = self;
+        let Self { controller, sensors, bench, reached, .. } = self;
         let mut playback = Playback::<NX, NY>::new(motion, controller.law_state().setpoint);
         let (mut detection, nothing) = (Detection::<NY>::default(), Thresholds::none());
         detection.start(controller.encoders().counts(), &controller.positions().data.0[0]);
         let mut held = 0;
         loop {
-            let counters = bench.counters();
+            let counters = read(bench, sensors);
             let command = controller.control_on_reference(&counters, playback.now(), |counts, y, e| {
                 raise_to(&mut reached.innovation, &e.map(|e| f64::from(e.abs())));
                 detection.test(&nothing, counts, y, e);
@@ -185,7 +196,7 @@ impl<'t, const NX: usize, const NY: usize, const N: usize> MotionRun<'t, NX, NY,
         let here = self.controller.law_state().setpoint;
         self.controller.set_setpoint(here)?;
         for _ in 0..ticks {
-            let command = self.controller.control(&self.bench.counters());
+            let command = self.controller.control(&read(&mut self.bench, self.sensors));
             self.bench.tick(command.drive);
             self.controller.predict();
         }

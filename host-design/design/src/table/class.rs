@@ -1,7 +1,7 @@
 //! What the code of an image depends on: the numbers of states and sensors, how the sensors read, whether the drive
 //! takes pulses, and whether there are motions.
 
-use upright::table::{DriveMap, Fill, ReadingMap};
+use upright::table::{DriveMap, Fill, ReadingMap, SensorKind};
 
 use super::values::TableValues;
 
@@ -13,6 +13,9 @@ pub fn class_source(table: &TableValues) -> String {
         let mut kind = row.kind;
         if let Some(reading) = kind.reading_mut() {
             *reading = ReadingMap { bits: reading.bits, ..Fill::EMPTY };
+        }
+        if let SensorKind::OfPart(part) = &mut kind {
+            part.errors = Fill::EMPTY;
         }
         format!("    SensorRow {{ kind: SensorKind::{kind:?}, ..Fill::EMPTY }},\n")
     });

@@ -32,6 +32,7 @@ pub use class::class_source;
 pub use error::NoTable;
 pub use image::image_tables;
 pub use source::{gains_source, identity_differences};
+pub use supervision::sensor_rows;
 pub use swing_up::{MotionValues, SwingUpValues};
 pub use values::{Gains, LawValues, TableValues, step_map};
 #[cfg(not(target_family = "wasm"))]

@@ -227,6 +227,7 @@ impl Writer<'_> {
 fn inline(value: &TableNode) -> Result<String, core::fmt::Error> {
     match value {
         TableNode::Value(number) => Ok(literal(*number)),
+        TableNode::List(numbers) => Ok(format!("[{}]", row(numbers))),
         TableNode::Variant(variant, None) => Ok(variant.name.to_owned()),
         TableNode::Variant(variant, Some(node)) => Ok(format!("{}({})", variant.name, inline(node)?)),
         TableNode::Struct(kind, fields) => {

@@ -1,11 +1,11 @@
 //! Limits and thresholds of the supervisor, from the rig file to the firmware's types.
 
-use upright::table::{Limits, MotorTest, ReadingMap, SensorKind, SensorRow, Thresholds};
+use upright::table::{Limits, MotorTest, PartReading, ReadingMap, SensorKind, SensorRow, Thresholds};
 
 use super::any_size::{MAX_SENSORS, MAX_STATES};
 use super::error::{NoTable, finite};
 use crate::design::DetectionDesign;
-use crate::rig::{Chain, Rig, Sensor, defaults};
+use crate::rig::{Chain, Rig, Sensor, TurnErrors, defaults};
 
 /// Motion by hand that the sign check of an encoder requires: of a link (rad) …
 const SIGN_RAD: f64 = 0.2;
@@ -54,6 +54,14 @@ fn set_limits_of_chain(limits: &mut Limits, rig: &Rig, chain: &Chain, steps: &[f
     Ok(())
 }
 
+/// The sensors of `rig`, as its gain table describes them.
+pub fn sensor_rows(rig: &Rig) -> Vec<SensorRow> {
+    let steps: Vec<f64> = rig.sensors().iter().map(|sensor| sensor.step()).collect();
+    let rounded: Vec<f32> = steps.iter().map(|&step| step as f32).collect();
+    let number = steps.len().min(MAX_SENSORS);
+    sensors(rig, number, &steps, &rounded)[..number].to_vec()
+}
+
 /// The `number` sensors of `rig`. With an observer they have steps, exact ones and those of the table (m or rad);
 /// without one, they have no distances in counts.
 pub(super) fn sensors(rig: &Rig, number: usize, steps: &[f64], rounded: &[f32]) -> [SensorRow; MAX_SENSORS] {
@@ -76,13 +84,30 @@ fn as_read(sensor: &Sensor, step: f64, row: SensorRow) -> SensorRow {
     let Some(range) = sensor.absolute else { return row };
     let reading = ReadingMap { bits: range.bits, zero_counts: range.zero as i32 };
     SensorRow {
-        kind: match range.has_dead_band() {
-            true => SensorKind::Potentiometer(reading),
-            false => SensorKind::Absolute(reading),
+        kind: match sensor.part {
+            Some((part, errors)) => {
+                let errors = errors_from_rest(&errors, sensor.state, step);
+                SensorKind::OfPart(PartReading { reading, part: part as u32, errors })
+            }
+            None if range.has_dead_band() => SensorKind::Potentiometer(reading),
+            None => SensorKind::Absolute(reading),
         },
         still_counts: 1 + counts(STILL_DEVIATIONS * sensor.noise, step),
         ..row
     }
+}
+
+/// The errors as [`PartReading`] has them, of the sensor of this state whose step is `step` (rad): the angle is counted
+/// from where the links hang, half a turn from straight for the first one.
+fn errors_from_rest(errors: &TurnErrors, state: usize, step: f64) -> [f32; 4] {
+    let hangs_at = if state == 2 { core::f64::consts::PI } else { 0.0 };
+    let [once, twice] = errors.harmonics();
+    let parts = |[amplitude, phase]: [f64; 2], turns: f64| {
+        let (sin, cos) = (libm::sin(turns * hangs_at + phase), libm::cos(turns * hangs_at + phase));
+        [amplitude * sin, amplitude * cos].map(|part| (part / step) as f32)
+    };
+    let ([c1, s1], [c2, s2]) = (parts(once, 1.0), parts(twice, 2.0));
+    [c1, s1, c2, s2]
 }
 
 /// The row with the distances in counts of this sensor of a chain: the cart's is the first.

@@ -190,7 +190,7 @@ fn no_number_of_integration_steps_decides_how_a_rig_balances() {
         rig => change(&rig, steps, 1.0),
     };
     let of_all: Vec<_> = names.map(|name| (found(&name, [4, 8]), name)).collect();
-    assert_eq!(of_all.len(), 17);
+    assert_eq!(of_all.len(), 18);
     for (found, name) in of_all {
         println!("{name}: {found:.1e}");
         assert!(found < 1e-6, "{name}: {found:.1e}");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use upright_design::plant::MotorPlant;
 use upright_design::rig::{
     Absent, Actuator, Base, Cart, CartInput, Chain, Limits, Link, LinkEncoder, PlantDescription,
-    PolePlacement, Rig, SECTIONS, TOP, Tick, defaults, key_table, unit_in_names,
+    PolePlacement, Rig, SECTIONS, TOP, Tick, TurnErrors, defaults, key_table, unit_in_names,
 };
 
 const MINIMAL: &str = r#"
@@ -70,6 +70,8 @@ fn what_is_left_out_gets_its_documented_default() {
         sensor_delay_s: 0.0,
         radius_m: 0.0,
         axial_inertia_kg_m2: 0.0,
+        part: None,
+        errors: TurnErrors::default(),
         mass_kg: 0.5,
         length_m: 0.4,
         centre_of_mass_m: None,
@@ -312,6 +314,8 @@ fn the_hash_sees_every_value() {
                 value.replacen('"', "\"x", 1)
             } else if key.trim() == "delay_ticks" {
                 "1".to_owned()
+            } else if key.trim() == "sensor" {
+                "\"mt6701\"".to_owned()
             } else if key.trim() == "sensor_bits" || key.trim() == "sensor_zero_counts" {
                 "15".to_owned()
             } else {

@@ -5,9 +5,10 @@ use core::ops::Range;
 
 use rand::RngExt;
 use rand_pcg::Pcg64;
+use upright::boards::parts::PartInterface;
 use upright_board::{
-    Chip, Conditions, ExternalLevel, Image, Input, Pin, SensorDefect, Time, UNITS_PER_MICROSECOND as US,
-    UNITS_PER_SECOND,
+    Chip, Conditions, ExternalLevel, Image, Input, Pin, RegisterDefect, SensorDefect, Time,
+    UNITS_PER_MICROSECOND as US, UNITS_PER_SECOND,
 };
 
 use upright_closed_loop::defects::{Defect, Trial};
@@ -136,24 +137,47 @@ impl OnChip for Defect {
 /// Events of a defect of an absolute sensor.
 fn of_absolute_sensor(trial: &Trial, table: &TableValues, tick: Time, random: &mut Pcg64) -> Vec<Event> {
     let at = |after: Time, input: Input| Event::Input { after, input };
-    match trial.kind {
-        Defect::SensorWire if table.sensors[trial.sensor].kind.is_potentiometer() => {
+    let encoder = trial.sensor;
+    match (table.sensors[encoder].kind.interface(), trial.kind) {
+        (Some(PartInterface::Analog), Defect::SensorWire) => {
             // It turns on all the time.
             let share = if trial.sign > 0.0 { 0.0 } else { 1.0 };
             let ticks = 0..trial.watched as Time;
             ticks.map(|since| at(since * tick, Input::Wiper(share))).collect()
         }
-        Defect::SensorWire | Defect::MagnetMissing => {
+        (Some(PartInterface::TwoWires(part)), Defect::MagnetMissing) => {
+            // It turns on all the time, and says in each tick that it has no magnet.
+            let [address, first] = [part.address, part.register];
+            let values = part.registers(None);
+            let ticks = 0..trial.watched as Time;
+            ticks
+                .map(|since| at(since * tick, Input::Registers { encoder, address, first, values }))
+                .collect()
+        }
+        (Some(PartInterface::TwoWires(_)), Defect::SensorWire) => {
+            let defect = match (trial.sign > 0.0, trial.size > 0.5) {
+                (true, true) => RegisterDefect::WireOpen,
+                (true, false) => RegisterDefect::OtherAddress,
+                (false, _) => RegisterDefect::WireGrounded,
+            };
+            vec![at(0, Input::RegisterDefect { encoder, defect })]
+        }
+        (Some(PartInterface::TwoWires(_)), Defect::FrameBit) => {
+            let every = tick * (5 + (45.0 * trial.size) as Time);
+            let holds = Input::RegisterDefect { encoder, defect: RegisterDefect::Holds };
+            (0..trial.watched as Time * tick / every).map(|number| at(number * every, holds)).collect()
+        }
+        (_, Defect::SensorWire | Defect::MagnetMissing) => {
             let defect = match trial.kind {
                 Defect::MagnetMissing => SensorDefect::NoMagnet,
                 _ if trial.sign > 0.0 => SensorDefect::WireOpen,
                 _ => SensorDefect::WireGrounded,
             };
-            vec![at(0, Input::AngleDefect { encoder: trial.sensor, defect })]
+            vec![at(0, Input::AngleDefect { encoder, defect })]
         }
-        Defect::FrameBit => {
+        (_, Defect::FrameBit) => {
             let every = tick * (5 + (45.0 * trial.size) as Time);
-            let show = |after, defect| at(after, Input::AngleDefect { encoder: trial.sensor, defect });
+            let show = |after, defect| at(after, Input::AngleDefect { encoder, defect });
             let one = |number: Time| {
                 let bits = SensorDefect::FlippedBits(1 << random.random_range(0..16));
                 let begin = number * every;

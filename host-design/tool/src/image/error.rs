@@ -70,6 +70,17 @@ pub enum BuildError {
         /// Number of the first such sensor (0: cart, 1: first link).
         sensor: usize,
     },
+    /// Absolute sensors of different kinds, which share a clock.
+    #[error(
+        "{board} reads absolute sensors of one kind, and the {} has another one than the {}: give both the same sensor",
+        joint(sensors[1] as u8), joint(sensors[0] as u8)
+    )]
+    DifferentParts {
+        /// Which board.
+        board: &'static BoardRow,
+        /// Numbers of two such sensors (0: cart, 1: first link).
+        sensors: [usize; 2],
+    },
     /// The board cannot make the rig's tick.
     #[error(
         "{board} makes ticks of {} to {} ms, and this rig's is {} ms: change tick.period_s, or use another board",

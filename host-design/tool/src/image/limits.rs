@@ -1,9 +1,10 @@
 //! What a board can do for a rig, checked before the compiler is started, whose errors name lines of the image.
 
+use upright::boards::parts::PartInterface;
 use upright::boards::rp::RpChip;
-use upright::boards::wiring::{Signal, Wire};
+use upright::boards::wiring::Signal;
 use upright::boards::{BoardRow, Family, PULSES_HZ, f4};
-use upright::table::{SensorKind, StepMap};
+use upright::table::StepMap;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
@@ -55,26 +56,39 @@ fn gives_pulses(board: &'static BoardRow, tick_s: f64, steps: Option<&StepMap>) 
     if rate > most { Err(BuildError::Pulses { board, most, rate }) } else { Ok(()) }
 }
 
-/// Whether the board has a bus for absolute sensors.
-fn has_bus(board: &BoardRow) -> bool {
-    let is_select = |wire: &Wire| wire.signal == Signal::AngleSelect;
-    matches!(&board.family, Family::F4(board) if board.wiring.iter().any(is_select))
+/// Whether the board has the wires for sensors of this kind.
+fn has_wires(board: &BoardRow, interface: PartInterface) -> bool {
+    let is_on_two_wires = matches!(interface, PartInterface::TwoWires(_));
+    let wanted = if is_on_two_wires { Signal::AngleClock } else { Signal::AngleSelect };
+    match &board.family {
+        Family::F4(board) => board.wiring.iter().any(|wire| wire.signal == wanted),
+        Family::Rp(_) => is_on_two_wires,
+    }
 }
 
-/// Checks that the board reads the absolute sensors of the table's rig, if it has any.
+/// Checks that the board reads the absolute sensors of the table's rig, if it has any. Those on the bus are of one
+/// kind.
 fn reads_all(board: &'static BoardRow, table: &TableValues) -> Result<(), BuildError> {
+    let mut on_bus: Option<(PartInterface, usize)> = None;
     for (sensor, row) in table.rows().iter().enumerate() {
-        if row.kind.is_absolute() && !has_bus(board) {
+        let (Some(interface), Some(reading)) = (row.kind.interface(), row.kind.reading()) else { continue };
+        if !has_wires(board, interface) {
             return Err(BuildError::AbsoluteSensor { sensor });
         }
-        match row.kind {
-            SensorKind::Potentiometer(reading) if sensor != 1 || reading.bits != f4::WIPER_BITS => {
+        match interface {
+            PartInterface::Analog if sensor != 1 || reading.bits != f4::WIPER_BITS => {
                 return Err(BuildError::Potentiometer { board, link: sensor });
             }
-            SensorKind::Absolute(reading) if reading.bits != f4::ANGLE_BITS => {
+            PartInterface::Frames if reading.bits != f4::ANGLE_BITS => {
                 return Err(BuildError::AngleBits { board, sensor });
             }
-            _ => {}
+            PartInterface::Analog => {}
+            PartInterface::Frames | PartInterface::TwoWires(_) => match on_bus {
+                Some((other, first)) if other != interface => {
+                    return Err(BuildError::DifferentParts { board, sensors: [first, sensor] });
+                }
+                _ => on_bus = Some((interface, sensor)),
+            },
         }
     }
     Ok(())

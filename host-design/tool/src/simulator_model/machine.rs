@@ -1,7 +1,7 @@
 //! What both formats take from a rig.
 
 use upright_design::reality::real_chain;
-use upright_design::rig::{Chain, Link, Rig};
+use upright_design::rig::{Base, Chain, Link, Rig};
 
 /// Name of the link without mass at the end of the last link in a URDF: a URDF has no lengths.
 pub(crate) const TIP: &str = "tip";
@@ -15,6 +15,9 @@ pub enum NoModel {
     /// It is given by matrices.
     #[error("[model] has no bodies: describe the machine by [cart] and [[link]]")]
     NoBodies,
+    /// Its links are on an arm.
+    #[error("links on an arm are not written: only a cart and a chain of hinges are")]
+    Arm,
     /// The mass of the cart is unknown.
     #[error("mass_kg of [cart] is missing: a URDF needs it, whatever drives the cart")]
     NoCartMass,
@@ -23,6 +26,9 @@ pub enum NoModel {
 /// The simulated machine's chain.
 pub(super) fn machine(rig: &Rig) -> Result<Chain, NoModel> {
     let chain = rig.chain().ok_or(NoModel::NoBodies)?;
+    if chain.base != Base::Cart {
+        return Err(NoModel::Arm);
+    }
     Ok(real_chain(chain, &rig.reality.parameters))
 }
 

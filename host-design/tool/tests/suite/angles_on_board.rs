@@ -1,10 +1,11 @@
 //! Absolute sensors on the virtual board: the flashed image reads them over their bus, and has the bits of the host.
 
+use upright::boards::parts::PartInterface;
 use upright::boards::{DEFAULT_BOARD, named};
 use upright::protocol::message::{Answer, Request};
 use upright::supervision::fault::Fault;
-use upright::table::Law;
-use upright_board::{Conditions, Image, Input, SensorDefect};
+use upright::table::{Law, SensorKind};
+use upright_board::{Conditions, Image, Input, RegisterDefect, SensorDefect};
 use upright_closed_loop::harness::{Recording, World};
 use upright_design::design::design;
 use upright_design::rig::{LinkEncoder, Rig};
@@ -171,6 +172,54 @@ fn the_image_balances_with_a_potentiometer_with_the_bits_of_the_host() {
     let cycles = measure(&rig, &table, &scenario, &image, &Conditions::f405(1)).unwrap();
     println!("inputs {:?}, whole {:?}", cycles.all.inputs, cycles.all.whole);
     assert!(cycles.all.inputs.us < 8.0 && cycles.check().is_ok(), "{:?}", cycles.all.inputs);
+}
+
+#[test]
+fn the_image_balances_with_a_sensor_on_two_wires_with_the_bits_of_the_host() {
+    let (rig, table) = rig_and_table("single-as5600");
+    let Some(image) = image(rig, table) else { return };
+    let scenario = Scenario { duration_s: 2.0, ..Scenario::at_rest(rig, Law::Lqr) };
+    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), table).unwrap();
+    let (recording, [_, messages]): (Recording, _) = run_compared(rig, table, &scenario, &mut board).unwrap();
+    assert!(recording.fault.is_none() && recording.summary.survives(), "{:?}", recording.fault);
+    assert!(messages > 100, "{messages}");
+    // Negative control: a firmware that does not take out the error twice per turn.
+    let mut other = table.clone();
+    let SensorKind::OfPart(part) = &mut other.sensors[1].kind else { panic!() };
+    part.errors = [0.0; 4];
+    let mut board = VirtualBoard::start(&image, &Conditions::f405(1), table).unwrap();
+    let error = run_compared(rig, &other, &scenario, &mut board).unwrap_err().to_string();
+    assert!(error.contains("differ"), "{error}");
+    let cycles = measure(rig, table, &scenario, &image, &Conditions::f405(1)).unwrap();
+    println!("inputs {:?}, whole {:?}", cycles.all.inputs, cycles.all.whole);
+    assert!(cycles.all.inputs.us < 130.0 && cycles.check().is_ok(), "{:?}", cycles.all.inputs);
+    let [off, balancing] = [cycles.off, cycles.balancing].map(|ticks| ticks.unwrap().inputs.cycles);
+    assert!(off.abs_diff(balancing) < 400, "{off} {balancing}");
+}
+
+#[test]
+fn defects_of_a_sensor_on_two_wires_are_found_or_survived() {
+    let rig = rig_and_table("single-as5600");
+    let Some(image) = image(&rig.0, &rig.1) else { return };
+    let Some(PartInterface::TwoWires(part)) = rig.1.sensors[1].kind.interface() else { panic!() };
+    let spoilt = |defect| Some(Input::RegisterDefect { encoder: 1, defect });
+    for defect in [RegisterDefect::WireOpen, RegisterDefect::WireGrounded, RegisterDefect::OtherAddress] {
+        let found = with_defect(rig, &image, |_| spoilt(defect));
+        assert_eq!((found.0, found.1), (Some((Fault::Encoder, Some(1))), 3), "{defect:?}");
+    }
+    let values = part.registers(None);
+    let [address, first] = [part.address, part.register];
+    let no_magnet =
+        with_defect(rig, &image, |_| Some(Input::Registers { encoder: 1, address, first, values }));
+    assert_eq!((no_magnet.0, no_magnet.1), (Some((Fault::Encoder, Some(1))), 3));
+    // The clock of the next reading frees a wire that is held: one bad sample in four ticks.
+    let held =
+        with_defect(rig, &image, |tick| if tick % 4 == 0 { spoilt(RegisterDefect::Holds) } else { None });
+    println!("held: {held:?}");
+    assert!(held.0.is_none() && held.2 > 200, "{held:?}");
+    // Negative control: held in every tick.
+    let always = with_defect(rig, &image, |_| spoilt(RegisterDefect::Holds));
+    assert_eq!(always.0, Some((Fault::Encoder, Some(1))));
 }
 
 #[test]

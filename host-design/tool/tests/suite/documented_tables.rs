@@ -341,7 +341,7 @@ fn connected_to(signal: Signal, has_bus: bool) -> String {
         Signal::LimitHigh => "limit switch, high end: opens when pressed".to_owned(),
         Signal::Supply => "supply voltage through 22 kΩ; 1 kΩ to ground".to_owned(),
         Signal::AngleSelect => "absolute sensors, select (CSn)".to_owned(),
-        Signal::AngleClock => "absolute sensors, clock (CLK)".to_owned(),
+        Signal::AngleClock => "absolute sensors, clock (CLK, SCL)".to_owned(),
         Signal::AngleCommand => "absolute sensors, command (MOSI)".to_owned(),
         Signal::Transmit => "serial line to the host".to_owned(),
         Signal::Receive => "serial line from the host".to_owned(),

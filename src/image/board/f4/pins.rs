@@ -20,6 +20,8 @@ const PORTS: usize = 4;
 #[derive(Clone, Copy)]
 struct PortSettings {
     mode: u32,
+    /// Outputs that only pull low: high at first.
+    open_drain: u32,
     pull: u32,
     two_bits: u32,
     alternate: [u32; 2],
@@ -28,7 +30,8 @@ struct PortSettings {
 
 const SET_UP: [PortSettings; PORTS] = {
     let mut ports =
-        [PortSettings { mode: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] }; PORTS];
+        [PortSettings { mode: 0, open_drain: 0, pull: 0, two_bits: 0, alternate: [0; 2], four_bits: [0; 2] };
+            PORTS];
     let mut i = 0;
     while i <= BOARD.wiring.len() {
         let wire = if i < BOARD.wiring.len() { BOARD.wiring[i] } else { BOARD.status_led };
@@ -42,10 +45,11 @@ const SET_UP: [PortSettings; PORTS] = {
         port.two_bits |= 3 << at;
         port.mode |= match mode {
             PinMode::Input => 0,
-            PinMode::Output => 1,
+            PinMode::Output | PinMode::OpenDrain => 1,
             PinMode::Alternate(_) => 2,
             PinMode::Analog => 3,
         } << at;
+        port.open_drain |= (matches!(mode, PinMode::OpenDrain) as u32) << wire.pin;
         port.pull |= (wire.pull_up && !matches!(mode, PinMode::Analog)) as u32 * (1 << at);
         if let PinMode::Alternate(number) = mode {
             port.alternate[half] |= (number as u32) << (4 * (wire.pin % 8));
@@ -56,7 +60,7 @@ const SET_UP: [PortSettings; PORTS] = {
     ports
 };
 
-/// Sets up all pins. The outputs are low from the start, because the output registers hold 0 after a reset.
+/// Sets up all pins. Outputs that drive are low from the start, because the output registers hold 0 after a reset.
 pub(super) fn set_up(syscfg: &SYSCFG, exti: &EXTI) {
     for (number, port) in SET_UP.iter().enumerate() {
         let base = 0x4002_0000 + 0x400 * number;
@@ -68,6 +72,8 @@ pub(super) fn set_up(syscfg: &SYSCFG, exti: &EXTI) {
         // Alternate functions first, so that no pin has the wrong one even for a moment.
         change(0x20, port.four_bits[0], port.alternate[0]);
         change(0x24, port.four_bits[1], port.alternate[1]);
+        change(0x14, port.open_drain, port.open_drain);
+        change(0x04, port.open_drain, port.open_drain);
         change(0x0c, port.two_bits, port.pull);
         change(0x00, port.two_bits, port.mode);
     }

@@ -2,8 +2,10 @@
 
 use upright::boards::f4::ANGLE_BITS;
 pub(super) use upright::boards::f4::WIPER_BITS;
+use upright::boards::parts::PartInterface;
 use upright::boards::wiring::{PinMode, Signal, Wire, wire_of};
 use upright::gains::{SENSORS, TABLE};
+use upright::table::SensorKind;
 
 use super::chosen::BOARD;
 
@@ -11,18 +13,64 @@ use super::chosen::BOARD;
 const WIPER: usize = 1;
 const WIPER_SIGNAL: Signal = Signal::Encoder(WIPER as u8, b'B');
 
-/// Whether the rig has absolute sensors on the bus.
-pub(super) const ANY_IS_ON_BUS: bool = {
-    let (mut any, mut sensor) = (false, 0);
+/// What the sensors on the bus are, if the rig has any: one bus has sensors of one kind.
+pub(super) const BUS: Option<PartInterface> = {
+    let (mut bus, mut sensor) = (None, 0);
     while sensor < SENSORS {
-        if is_on_bus(sensor) {
-            assert!(has_bits(sensor, ANGLE_BITS), "an absolute sensor of other bits");
-            any = true;
+        if let Some(interface) = on_bus(sensor) {
+            assert!(has_bits(sensor, BITS), "absolute sensors of different bits");
+            assert!(part_number(sensor) == part_number(FIRST), "absolute sensors of different parts");
+            bus = Some(interface);
         }
         sensor += 1;
     }
-    any
+    bus
 };
+
+/// The first sensor on the bus.
+const FIRST: usize = {
+    let mut sensor = 0;
+    while sensor < SENSORS && on_bus(sensor).is_none() {
+        sensor += 1;
+    }
+    sensor
+};
+
+/// Number of the part that a sensor is; that of no part for one that the gain table does not name.
+const fn part_number(sensor: usize) -> u32 {
+    match &TABLE.sensors[sensor].kind {
+        SensorKind::OfPart(part) => part.part,
+        _ => u32::MAX,
+    }
+}
+
+/// Bits of the sensors on the bus.
+pub(super) const BITS: u32 = {
+    if FIRST < SENSORS && part_number(FIRST) != u32::MAX {
+        match TABLE.sensors[FIRST].kind.reading() {
+            Some(reading) => reading.bits,
+            None => ANGLE_BITS,
+        }
+    } else {
+        ANGLE_BITS
+    }
+};
+
+/// The sensors on the bus, by bits.
+pub(super) const ON_BUS: u32 = {
+    let (mut bits, mut sensor) = (0, 0);
+    while sensor < SENSORS {
+        bits |= (is_on_bus(sensor) as u32) << sensor;
+        sensor += 1;
+    }
+    bits
+};
+
+/// Whether they are on two wires.
+const IS_TWO_WIRES: bool = matches!(BUS, Some(PartInterface::TwoWires(_)));
+
+/// Whether the rig has absolute sensors on the bus.
+pub(super) const ANY_IS_ON_BUS: bool = BUS.is_some();
 
 /// The wire of the wiper, if the rig has a potentiometer.
 pub(super) const WIPER_WIRE: Option<Wire> = if is_absolute(WIPER) && !is_on_bus(WIPER) {
@@ -37,7 +85,7 @@ pub(super) const ANY_IS_ABSOLUTE: bool = ANY_IS_ON_BUS || WIPER_WIRE.is_some();
 
 /// Whether a sensor of the rig is absolute.
 pub(super) const fn is_absolute(sensor: usize) -> bool {
-    sensor < SENSORS && TABLE.sensors[sensor].kind.is_absolute()
+    sensor < SENSORS && TABLE.sensors[sensor].kind.interface().is_some()
 }
 
 /// Whether the readings of an absolute sensor have so many bits.
@@ -45,15 +93,33 @@ const fn has_bits(sensor: usize, bits: u32) -> bool {
     matches!(TABLE.sensors[sensor].kind.reading(), Some(reading) if reading.bits == bits)
 }
 
-/// Whether a sensor of the rig is on the bus. Only one may be a potentiometer.
+/// Whether a sensor of the rig is on the bus.
 pub(super) const fn is_on_bus(sensor: usize) -> bool {
-    is_absolute(sensor) && (sensor != WIPER || !TABLE.sensors[sensor].kind.is_potentiometer())
+    on_bus(sensor).is_some()
+}
+
+/// How a sensor on the bus is read. Only one sensor may be a potentiometer, which is not on it.
+const fn on_bus(sensor: usize) -> Option<PartInterface> {
+    if sensor >= SENSORS {
+        return None;
+    }
+    match TABLE.sensors[sensor].kind.interface() {
+        Some(PartInterface::Analog) => {
+            assert!(sensor == WIPER, "a potentiometer in another place");
+            None
+        }
+        interface => interface,
+    }
 }
 
 /// Mode of a pin in this image; none, if it is left alone.
 pub(super) const fn mode(wire: Wire) -> Option<PinMode> {
     match wire.signal {
-        Signal::AngleSelect | Signal::AngleClock | Signal::AngleCommand if !ANY_IS_ON_BUS => None,
+        Signal::AngleClock if !ANY_IS_ON_BUS => None,
+        Signal::AngleSelect | Signal::AngleCommand if !matches!(BUS, Some(PartInterface::Frames)) => None,
+        Signal::Encoder(sensor, b'A') if is_on_bus(sensor as usize) && IS_TWO_WIRES => {
+            Some(PinMode::OpenDrain)
+        }
         Signal::Encoder(1, b'B') if WIPER_WIRE.is_some() => Some(PinMode::Analog),
         Signal::Encoder(sensor, _) if is_absolute(sensor as usize) => Some(PinMode::Input),
         _ => Some(wire.mode),

@@ -3,11 +3,15 @@
 use std::f64::consts::{LN_2, PI, TAU};
 
 use serde::Serialize;
+#[cfg(any(doc, test))]
+use upright::boards::parts::PARTS;
+use upright::boards::parts::{SensorPart, part};
 
 use super::super::error::RigError;
 use super::super::key::{Absent, Key, Section};
 use super::super::node::{Node, Table};
 use super::super::rule::Rule;
+use super::super::value::{Keys, keys};
 use crate::number::significant;
 
 /// `[[link]]`
@@ -16,7 +20,7 @@ pub(crate) static LINK: Section = Section {
     title: "[[link]]",
     meaning: "one table per link, from the cart outwards, 1 to 14 of them",
     absent: Absent::RequiredIf("unless [model]"),
-    keys: &[LINK_KEYS],
+    keys: &[LINK_KEYS, TurnErrors::KEYS],
 };
 
 const LINK_KEYS: &[Key] = &[
@@ -112,11 +116,18 @@ const LINK_KEYS: &[Key] = &[
         absent: Absent::Follows("what encoder_step_rad gives; neither, no encoder"),
     },
     Key {
+        name: "sensor",
+        unit: "",
+        rule: Rule::checked_by_its_section("\"as5047\", \"as5600\", \"mt6701\" or \"as5048b\""),
+        meaning: "an absolute sensor that boards know by its name; it gives sensor_bits, noise and delay",
+        absent: Absent::Follows("none"),
+    },
+    Key {
         name: "sensor_bits",
         unit: "bits",
         rule: Rule::BITS,
         meaning: "resolution of an absolute sensor, instead of an encoder; the upper 16 are used",
-        absent: Absent::Follows("no absolute sensor"),
+        absent: Absent::Follows("no absolute sensor, or that of sensor"),
     },
     Key {
         name: "sensor_travel_rad",
@@ -138,16 +149,50 @@ const LINK_KEYS: &[Key] = &[
         rule: Rule::NOISE,
         meaning: "noise of this sensor besides the rounding to its bits, root mean square; a tenth of it or more is real, or a link at rest \
                   is taken for a frozen sensor",
-        absent: Absent::Numbers(&[0.0]),
+        absent: Absent::Follows("0, or that of sensor"),
     },
     Key {
         name: "sensor_delay_s",
         unit: "s",
         rule: Rule::NOT_NEGATIVE.worded("a number >= 0, with an encoder or sensor"),
         meaning: "age of the reading of encoder or sensor at the tick, by its own filter and its bus; made up for",
-        absent: Absent::Numbers(&[0.0]),
+        absent: Absent::Follows("0, or that of sensor"),
     },
 ];
+
+const WITH_A_PART: Rule = Rule::NOT_NEGATIVE.worded("a number >= 0, with sensor");
+const PHASE_WITH_A_PART: Rule = Rule::SIGNED_ANGLE.worded("a number from -pi to pi (rad), with sensor");
+
+keys! {
+    /// Known errors of an absolute sensor, which the firmware takes out: `a sin(θ + p)` and `b sin(2 θ + q)` at the
+    /// joint's angle θ.
+    #[derive(Copy, Default)]
+    pub struct TurnErrors {
+        sensor_once_per_turn_rad: f64, "rad", WITH_A_PART,
+            "amplitude of this sensor's error once per turn, which is taken out", Absent::Numbers(&[0.0]);
+        sensor_once_per_turn_phase_rad: f64, "rad", PHASE_WITH_A_PART,
+            "phase of that error when the joint is straight", Absent::Numbers(&[0.0]);
+        sensor_twice_per_turn_rad: f64, "rad", WITH_A_PART,
+            "amplitude of this sensor's error twice per turn, which is taken out", Absent::Numbers(&[0.0]);
+        sensor_twice_per_turn_phase_rad: f64, "rad", PHASE_WITH_A_PART,
+            "phase of that error when the joint is straight", Absent::Numbers(&[0.0]);
+    }
+}
+
+impl TurnErrors {
+    /// Amplitude and phase of the error once per turn, and of that twice per turn.
+    pub fn harmonics(&self) -> [[f64; 2]; 2] {
+        [
+            [self.sensor_once_per_turn_rad, self.sensor_once_per_turn_phase_rad],
+            [self.sensor_twice_per_turn_rad, self.sensor_twice_per_turn_phase_rad],
+        ]
+    }
+
+    /// Whether there are none.
+    pub fn are_none(&self) -> bool {
+        self.sensor_once_per_turn_rad == 0.0 && self.sensor_twice_per_turn_rad == 0.0
+    }
+}
 
 /// One link of a chain, `[[link]]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -173,6 +218,12 @@ pub struct Link {
     /// Moment of inertia about its own length (kg·m²), which turns only with an arm.
     #[serde(skip_serializing_if = "is_zero")]
     pub axial_inertia_kg_m2: f64,
+    /// Number of the part that is its absolute sensor, in [`PARTS`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part: Option<usize>,
+    /// Errors of that sensor.
+    #[serde(skip_serializing_if = "TurnErrors::are_none")]
+    pub errors: TurnErrors,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
@@ -223,6 +274,8 @@ pub(super) fn link(
     table.not_both("inertia_kg_m2", "swing_period_s", ONE_INERTIA)?;
     table.not_both("inertia_about_joint_kg_m2", "swing_period_s", ONE_INERTIA)?;
     table.not_both("friction_n_m_s_per_rad", "swing_half_life_s", "keep the one that you measured")?;
+    let named = named_part(&table)?;
+    let row = named.map(|(_, row)| row);
     let length_m = table.value("length_m")?;
     let centre_of_mass_m = table.value("centre_of_mass_m")?;
     within_reach(&table, centre_of_mass_m, length_m)?;
@@ -232,11 +285,18 @@ pub(super) fn link(
         centre_of_mass_m,
         inertia_kg_m2: table.value("inertia_kg_m2")?,
         friction_n_m_s_per_rad: table.value("friction_n_m_s_per_rad")?,
-        encoder: link_encoder(&table, is_lowest)?,
-        sensor_delay_s: table.value("sensor_delay_s")?,
+        encoder: link_encoder(&table, row, is_lowest)?,
+        sensor_delay_s: given_or(&table, "sensor_delay_s", row.map(|row| row.delay_s))?,
+        part: named.map(|(number, _)| number),
+        errors: TurnErrors::read(&table)?,
         radius_m: table.value::<Option<f64>>("radius_m")?.or(radius_m).unwrap_or_default(),
         axial_inertia_kg_m2: axial_inertia(&table)?,
     };
+    if let (None, Some(key)) = (row, TurnErrors::KEYS.iter().find(|key| table.get(key.name).is_some())) {
+        return Err(table
+            .required(key.name)?
+            .out_of_range("only with sensor", "name the part, or leave it out"));
+    }
     if let (None, Some(node)) = (link.encoder, table.get("sensor_delay_s")) {
         return Err(
             node.out_of_range("only with an encoder or sensor", "describe it, or leave sensor_delay_s out")
@@ -352,11 +412,40 @@ fn within_reach(table: &Table<'_>, centre_of_mass_m: Option<f64>, length_m: f64)
     }
 }
 
-fn link_encoder(table: &Table<'_>, is_lowest: bool) -> Result<Option<LinkEncoder>, RigError> {
+/// The part that the file names, with its number.
+fn named_part(table: &Table<'_>) -> Result<Option<(usize, &'static SensorPart)>, RigError> {
+    let Some(node) = table.get("sensor") else { return Ok(None) };
+    for other in ["encoder_step_rad", "encoder_counts_per_rev", "sensor_travel_rad"] {
+        table.not_both("sensor", other, "keep the one that the board reads")?;
+    }
+    let key = LINK.key("sensor");
+    let named = part(node.text(key.rule.accepts, key.meaning)?);
+    let Some((number, row)) = named else {
+        let remedy = "name the part, or describe it by sensor_bits, sensor_noise_rad and sensor_delay_s";
+        return Err(node.out_of_range(key.rule.accepts, remedy));
+    };
+    match table.get("sensor_bits") {
+        Some(bits) if table.value::<Option<f64>>("sensor_bits")? != Some(row.bits.into()) => {
+            Err(bits.out_of_range(&format!("{} with sensor = \"{}\"", row.bits, row.name), "leave it out"))
+        }
+        _ => Ok(Some((number, row))),
+    }
+}
+
+/// A number of the file, or that of the part, or 0.
+fn given_or(table: &Table<'_>, key: &str, of_part: Option<f64>) -> Result<f64, RigError> {
+    Ok(table.value::<Option<f64>>(key)?.or(of_part).unwrap_or_default())
+}
+
+fn link_encoder(
+    table: &Table<'_>,
+    row: Option<&SensorPart>,
+    is_lowest: bool,
+) -> Result<Option<LinkEncoder>, RigError> {
     table.not_both("encoder_step_rad", "encoder_counts_per_rev", "keep the one the data sheet gives")?;
     table.not_both("encoder_step_rad", "sensor_bits", "keep the one that the board reads")?;
     table.not_both("encoder_counts_per_rev", "sensor_bits", "keep the one that the board reads")?;
-    if let Some(absolute) = absolute_sensor(table, is_lowest)? {
+    if let Some(absolute) = absolute_sensor(table, row, is_lowest)? {
         return Ok(Some(absolute));
     }
     let step: Option<f64> = table.value("encoder_step_rad")?;
@@ -364,8 +453,13 @@ fn link_encoder(table: &Table<'_>, is_lowest: bool) -> Result<Option<LinkEncoder
     Ok(step.map(LinkEncoder::StepRad).or(counts.map(LinkEncoder::CountsPerRev)))
 }
 
-fn absolute_sensor(table: &Table<'_>, is_lowest: bool) -> Result<Option<LinkEncoder>, RigError> {
-    let Some(bits) = table.value::<Option<f64>>("sensor_bits")? else {
+fn absolute_sensor(
+    table: &Table<'_>,
+    row: Option<&SensorPart>,
+    is_lowest: bool,
+) -> Result<Option<LinkEncoder>, RigError> {
+    let given: Option<f64> = table.value("sensor_bits")?;
+    let Some(bits) = given.or(row.map(|row| row.bits.into())) else {
         let needs_bits = ["sensor_travel_rad", "sensor_zero_counts", "sensor_noise_rad"]
             .iter()
             .any(|key| table.get(key).is_some());
@@ -381,7 +475,8 @@ fn absolute_sensor(table: &Table<'_>, is_lowest: bool) -> Result<Option<LinkEnco
         let remedy = "give what the sensor reads while the links hang, or correct sensor_bits";
         return Err(table.required("sensor_zero_counts")?.out_of_range(&accepts, remedy));
     }
-    let (travel_rad, noise_rad) = (table.value("sensor_travel_rad")?, table.value("sensor_noise_rad")?);
+    let travel_rad = table.value("sensor_travel_rad")?;
+    let noise_rad = given_or(table, "sensor_noise_rad", row.map(|row| row.noise_rad))?;
     if let Some(travel_rad) = travel_rad {
         within_travel(table, turn, travel_rad, is_lowest)?;
     }
@@ -490,6 +585,41 @@ mod tests {
         ] {
             let error = parse(&format!("{first}\n{second}")).unwrap_err().to_string();
             assert!(error.contains("keep the one that you measured"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_named_sensor_fills_what_the_file_leaves_out() {
+        let link = parse("sensor = \"as5600\"\nsensor_zero_counts = 9").unwrap();
+        let row = &PARTS[link.part.unwrap()];
+        let wanted =
+            LinkEncoder::Absolute { bits: 12, travel_rad: None, zero_counts: 9, noise_rad: row.noise_rad };
+        assert_eq!((link.encoder, link.sensor_delay_s), (Some(wanted), row.delay_s));
+        let own = parse("sensor = \"as5600\"\nsensor_noise_rad = 0.002\nsensor_delay_s = 0.0004").unwrap();
+        assert_eq!(own.sensor_delay_s, 4e-4);
+        assert!(matches!(own.encoder, Some(LinkEncoder::Absolute { noise_rad: 0.002, .. })));
+        // The rule of the key names each part, and no other.
+        let named: Vec<&str> = LINK.key("sensor").rule.accepts.split('"').skip(1).step_by(2).collect();
+        assert_eq!(named, PARTS.each_ref().map(|part| part.name));
+    }
+
+    #[test]
+    fn a_sensor_that_is_not_known_or_contradicts_the_file_is_refused() {
+        for (keys, words) in [
+            ("sensor = \"as5601\"", "accepted: \"as5047\", \"as5600\""),
+            ("sensor = 5600", "link[1].sensor"),
+            ("sensor = \"as5600\"\nsensor_bits = 14", "accepted: 12 with sensor = \"as5600\""),
+            ("sensor = \"as5600\"\nencoder_counts_per_rev = 4096", "keep the one that the board reads"),
+            ("sensor = \"as5600\"\nsensor_travel_rad = 6", "keep the one that the board reads"),
+            ("sensor = \"as5600\"\nsensor_zero_counts = 4096", "a whole number from 0 to 4095"),
+            ("sensor_bits = 14\nsensor_twice_per_turn_rad = 0.01", "only with sensor"),
+            ("sensor_bits = 9", "a whole number from 10 to 18"),
+        ] {
+            let error = parse(keys).unwrap_err().to_string();
+            assert!(error.contains(words), "{keys}: {error}");
+        }
+        for bits in [10, 11] {
+            assert!(parse(&format!("sensor_bits = {bits}\nsensor_zero_counts = 700")).is_ok(), "{bits}");
         }
     }
 }

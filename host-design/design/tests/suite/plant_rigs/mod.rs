@@ -4,7 +4,7 @@
 #![allow(dead_code)]
 
 use proptest::prelude::*;
-use upright_design::rig::{Base, Cart, Chain, Link};
+use upright_design::rig::{Base, Cart, Chain, Link, TurnErrors};
 
 /// A uniform rod without friction.
 pub(crate) fn rod(mass_kg: f64, length_m: f64) -> Link {
@@ -12,6 +12,8 @@ pub(crate) fn rod(mass_kg: f64, length_m: f64) -> Link {
         sensor_delay_s: 0.0,
         radius_m: 0.0,
         axial_inertia_kg_m2: 0.0,
+        part: None,
+        errors: TurnErrors::default(),
         mass_kg,
         length_m,
         centre_of_mass_m: None,

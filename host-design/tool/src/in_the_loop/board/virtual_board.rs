@@ -25,6 +25,8 @@ const LEAD: Time = 2 * UNITS_PER_MICROSECOND;
 const INSIDE: Time = 3 * UNITS_PER_MICROSECOND;
 /// The serial line is quiet for this long before each tick, so that a byte belongs to one tick and no other.
 const QUIET: Time = 60 * UNITS_PER_MICROSECOND;
+/// Ticks of an image that reads sensors on two wires are so much longer, and the line is quiet for them, too.
+const READING: Time = 250 * UNITS_PER_MICROSECOND;
 /// Longest time from power-up to the first tick (s): an image without a crystal waits for it first.
 const START_S: f64 = 1.0;
 /// An unmapped address: executing it is a processor fault.
@@ -78,6 +80,8 @@ pub struct VirtualBoard {
     /// The pulses of a drive that takes them.
     pulses: Option<PulseCount>,
     tick_s: f64,
+    /// How long the image reads sensors on two wires.
+    reading: Time,
     /// Position of each encoder (edges).
     positions: Vec<i64>,
     counters: Option<Vec<u32>>,
@@ -129,6 +133,7 @@ impl VirtualBoard {
             force_limit_n: table.drive.supply_v().is_none().then_some(table.drive.largest_force_n()),
             pulses,
             tick_s: f64::from(table.tick_s),
+            reading: if AbsoluteAtPins::are_on_two_wires(table) { READING } else { 0 },
             positions: vec![0; table.sensors()],
             counters: None,
             absolute: (0..table.sensors()).map(|sensor| AbsoluteAtPins::of(table, sensor)).collect(),
@@ -379,7 +384,9 @@ impl Target for VirtualBoard {
         if self.is_cut {
             self.outgoing.clear();
         }
-        self.send(period);
+        if self.reading == 0 {
+            self.send(period);
+        }
         if pins.contacts.overrun {
             self.make_late(period)?;
         }
@@ -391,6 +398,10 @@ impl Target for VirtualBoard {
         }
         // Runs until the tick after this one, or until it would be due if none comes.
         self.run(begin + 2 * LEAD)?;
+        if self.reading > 0 {
+            self.run((begin + self.reading).max(self.board.now()))?;
+            self.send(period.saturating_sub(self.reading));
+        }
         let end = self.board.next_tick().map_or(begin + period, |next| next.saturating_sub(LEAD));
         self.run(end.max(begin + 3 * LEAD))?;
         let after = self.board.driven();
