@@ -7,10 +7,7 @@ use crate::published::rig_and_table;
 use upright::protocol::simulated_pins::BAD_SAMPLE;
 use upright::supervision::supervisor::State;
 use upright_closed_loop::harness::Pins;
-use upright_tool::image::PICO_BALANCING_CYCLES;
-
-/// Cycles of a tick that read the sensor, at most: 0.1 ms.
-const READING_CYCLES: u32 = 12_500;
+use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_READING_CYCLES};
 
 #[test]
 #[ignore = "runs an emulator of the chip"]
@@ -23,7 +20,7 @@ fn an_as5600_is_read_with_the_bits_of_the_host_until_its_magnet_is_gone() {
     let answers = Chip::start(&uf2, table.sensors()).replay(&run);
     let most = assert_equal(&run, &answers);
     assert!(run.outputs.last().is_some_and(|output| !output.enable), "the missing magnet was not noticed");
-    assert!(most <= PICO_BALANCING_CYCLES[0] + READING_CYCLES, "{most} cycles");
+    assert!(most <= PICO_BALANCING_CYCLES[0] + PICO_READING_CYCLES, "{most} cycles");
     // Negative control: the comparison notices a sensor that reads one step less.
     let mut other = recorded(rig, table, &by_hand(rig, 0.3), no_defect());
     for pins in &mut other.pins {

@@ -4,7 +4,7 @@ use upright::boards::parts::PartInterface;
 use upright::boards::rp::RpChip;
 use upright::boards::wiring::Signal;
 use upright::boards::{BoardRow, Family, PULSES_HZ, f4};
-use upright::table::StepMap;
+use upright::table::{SensorRow, StepMap};
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 
@@ -14,6 +14,8 @@ use super::error::{BuildError, MOST_PERCENT};
 pub const PICO_BALANCING_CYCLES: [u32; 4] = [15_000, 21_000, 27_000, 34_500];
 /// The same while it follows a motion.
 pub const PICO_MOTION_CYCLES: [u32; 4] = [30_000, 44_000, 60_000, 83_000];
+/// Cycles by which a tick is longer that reads sensors on two wires.
+pub const PICO_READING_CYCLES: u32 = 12_500;
 
 /// Checks what the board can do for this rig, as far as that is known before it is designed.
 ///
@@ -35,7 +37,9 @@ pub fn check_table(board: &'static BoardRow, table: &TableValues) -> Result<(), 
     makes_tick(board, tick_s)?;
     gives_pulses(board, tick_s, table.drive.pulses())?;
     reads_all(board, table)?;
-    has_time(board, table.sensors(), tick_s, table.swing_up.is_some())
+    let is_on_two_wires = |row: &SensorRow| matches!(row.kind.interface(), Some(PartInterface::TwoWires(_)));
+    let reading = if table.rows().iter().any(is_on_two_wires) { PICO_READING_CYCLES } else { 0 };
+    has_time(board, table.sensors(), tick_s, table.swing_up.is_some(), reading)
 }
 
 pub(super) fn counts(board: &'static BoardRow, needed: usize) -> Result<(), BuildError> {
@@ -101,6 +105,7 @@ fn has_time(
     sensors: usize,
     tick_s: f64,
     has_motions: bool,
+    reading: u32,
 ) -> Result<(), BuildError> {
     let Family::Rp(rp) = &board.family else { return Ok(()) };
     if rp.chip != RpChip::Rp2040 {
@@ -109,7 +114,8 @@ fn has_time(
     let clock_hz = f64::from(rp.chip.clock_hz());
     let links = sensors.saturating_sub(2).min(PICO_BALANCING_CYCLES.len() - 1);
     let fits = |cycles: u32| f64::from(cycles) <= clock_hz * tick_s * MOST_PERCENT / 1e2;
-    let (balancing, motion) = (PICO_BALANCING_CYCLES[links], PICO_MOTION_CYCLES[links]);
+    let [balancing, motion] =
+        [PICO_BALANCING_CYCLES[links], PICO_MOTION_CYCLES[links]].map(|cycles| cycles + reading);
     if !fits(balancing) {
         let remedy = "make tick.period_s longer, or use another board";
         return Err(BuildError::Cycles {
@@ -188,10 +194,14 @@ mod tests {
             (pico, 5, 5e-4, false),
             (pico2, 5, 7e-4, true),
         ] {
-            assert!(has_time(board, sensors, tick_s, has_motions).is_ok(), "{board} {sensors} {tick_s}");
+            assert!(has_time(board, sensors, tick_s, has_motions, 0).is_ok(), "{board} {sensors} {tick_s}");
         }
-        let four_links = has_time(pico, 5, 7e-4, true).unwrap_err().to_string();
+        let four_links = has_time(pico, 5, 7e-4, true, 0).unwrap_err().to_string();
         assert!(four_links.contains("83000 cycles") && four_links.contains("95 %"), "{four_links}");
         assert!(four_links.contains("--no-motions"), "{four_links}");
+        // Sensors on two wires take as long as half a link.
+        assert!(has_time(pico, 2, 2.5e-4, false, 0).is_ok());
+        let slow = has_time(pico, 2, 2.5e-4, false, PICO_READING_CYCLES).unwrap_err().to_string();
+        assert!(slow.contains("27500 cycles"), "{slow}");
     }
 }

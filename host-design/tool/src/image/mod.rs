@@ -34,7 +34,7 @@ pub use elf::{ElfError, LinkedImage};
 pub use error::{BuildError, NoCompiler, TARGET};
 pub use forbidden::{forbidden_functions, forbidden_in_handlers, wrong_functions};
 pub use gains::CommittedGains;
-pub use limits::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, check_rig, check_table};
+pub use limits::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES, PICO_READING_CYCLES, check_rig, check_table};
 pub use size::{ImagePart, Size, SizeError, size};
 pub use stack::{StackBound, StackError, StackLevel, stack_bound};
 pub use uf2::uf2;
