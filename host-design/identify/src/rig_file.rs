@@ -111,12 +111,15 @@ fn sensors(rig: &Rig, found: &Identification) -> Vec<(String, String)> {
     values
 }
 
+/// A key of `[reality]`, and its values.
+type RealKey = (&'static str, fn(&SensorErrors) -> &PerJoint);
+
 /// An error of the sensors once or twice per turn.
 struct Harmonic {
     /// The parameters that are the parts of it which follow the sine and the cosine.
     parts: [fn(usize) -> ParameterKind; 2],
     /// Amplitude and phase of the simulated machine.
-    real: [(&'static str, fn(&SensorErrors) -> &PerJoint); 2],
+    real: [RealKey; 2],
     /// Keys of those that are taken out of the readings of a part, and its place in [`TurnErrors::harmonics`].
     taken_out: [&'static str; 2],
     place: usize,
