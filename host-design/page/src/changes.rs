@@ -22,8 +22,8 @@ const OF_LINKS: [(&str, usize, usize); 8] = [
 /// Each further pole of a pole placement is faster than the one before by this much (1/s): equal ones cannot be placed.
 const APART_PER_S: f64 = 2.0;
 
-/// The text with this number of links, whose new ones are copies of the last one, and then with other values of some keys;
-/// those without a value are left out of it.
+/// The text with this number of links, whose new ones are copies of the last one, and then with other values of some
+/// keys; those without a value are left out of it.
 pub(crate) fn changed(
     toml: &str,
     links: Option<usize>,
@@ -79,9 +79,8 @@ pub(crate) fn differences(from: &str, toml: &str) -> Result<Vec<Value>, PageRefu
         .collect())
 }
 
-/// The sliders that a person finds first: what each changes, in which range, and the keys that change with it, each with
-/// its value and the power of the slider's relative change by which it is multiplied. Without a power, it is the slider's
-/// own value.
+/// The sliders that a person finds first: what each changes, and the keys that change with it. Each key has its value and
+/// the power of the slider's relative change by which it is multiplied; without a power, it has the slider's own value.
 pub(crate) fn dials(rig: &Rig, text: &RigText) -> Vec<Value> {
     let PlantDescription::Chain(chain) = &rig.plant else { return Vec::new() };
     let mut scales: [Vec<Value>; 2] = Default::default();

@@ -43,6 +43,14 @@ impl DeskDesign {
         Ok(Self { certified, table, trust: ShortTrust::default() })
     }
 
+    /// The same with a person's own gains in the table.
+    pub(crate) fn with_own(mut self, rig: &Rig, own: Option<&[f64]>) -> Result<Self, PageRefusal> {
+        if let (Some(k), Ok(table)) = (own, &self.table) {
+            self.table = Ok(with_gains(rig, table, k)?);
+        }
+        Ok(self)
+    }
+
     /// The gain table.
     pub(crate) fn table(&self) -> Result<&TableValues, PageRefusal> {
         Ok(self.table.as_ref().map_err(Clone::clone)?)
@@ -102,7 +110,24 @@ impl DeskDesign {
     /// How much the loop of the law with this name stands.
     pub(crate) fn survival(&self, rig: &Rig, law: &str) -> Result<Value, PageRefusal> {
         let table = self.table()?;
-        Ok(survival(rig, table, named(table, law)?)?)
+        Ok(json!(survival(rig, table, named(table, law)?)?))
+    }
+
+    /// The gain of the first law on the angle of the first link, in continuous time (N/rad); none without a law.
+    pub(crate) fn angle_gain(&self) -> Option<f64> {
+        let laws = self.certified.double.continuous.in_table();
+        laws.present().next().and_then(|(_, law)| law.k.entries().get(2).copied())
+    }
+
+    /// The rightmost pole of the first law's loop in continuous time (1/s); none without a law.
+    pub(crate) fn rightmost_pole(&self, rig: &Rig) -> Result<Option<f64>, PageRefusal> {
+        let poles = self.certified.poles(rig)?;
+        let rightmost = |law: Law| {
+            let [continuous, _] = poles.in_table(law);
+            let real = continuous?.iter().map(|pole| pole[0]).fold(f64::NEG_INFINITY, f64::max);
+            Some(real)
+        };
+        Ok(Law::ALL.into_iter().find_map(rightmost))
     }
 
     /// The trust report after the step of this number.
@@ -120,6 +145,22 @@ impl DeskDesign {
         };
         Ok(json!({ "laws": Law::ALL.map(of) }))
     }
+}
+
+/// The table of `rig` with the gains K, one per state, in place of those of its laws, and a set-point that the cart
+/// comes to. A gain on a force that is still to come stays.
+pub(crate) fn with_gains(rig: &Rig, table: &TableValues, k: &[f64]) -> Result<TableValues, PageRefusal> {
+    if k.len() != rig.states() {
+        return Err(PageRefusal::Answer(rig.states()));
+    }
+    let mut table = table.clone();
+    for law in Law::ALL {
+        if let Some(gains) = &mut table.laws[law] {
+            gains.k.iter_mut().zip(k).for_each(|(gain, &k)| *gain = k as f32);
+            gains.n = gains.k[0];
+        }
+    }
+    Ok(table)
 }
 
 /// The law of the table with this name.

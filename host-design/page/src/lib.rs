@@ -9,7 +9,8 @@
 //! | `changes.rs` | changes of its file: another number of links, the sliders that a person finds first |
 //! | `survival.rs` | how much a loop stands, in two numbers |
 //! | `trust.rs` | the trust report in short form, step by step |
-//! | `lesson.rs` | exercises, and how answers to them are marked |
+//! | `lab.rs`, `task.rs` | labs: what a class works on, what a step asks for, and how answers are marked |
+//! | `hand_in.rs` | what a student hands in, and how it is run again |
 //! | `fingerprint.rs` | checksums of tables and of 100 000 ticks of the firmware, to compare machines |
 //! | `twin/` | a rig that a person can pull, change and break |
 //! | `exported.rs` | the functions that a browser calls, the only ones with names of their own in the module |
@@ -21,14 +22,18 @@ mod designed;
 #[cfg(target_family = "wasm")]
 mod exported;
 mod fingerprint;
-mod lesson;
+mod hand_in;
+mod lab;
 mod question;
 mod refusal;
 mod sketch;
 mod survival;
+mod task;
 mod trust;
 pub mod twin;
 
 pub use fingerprint::{Fingerprint, FingerprintError, PullRounding, TICKS};
-pub use lesson::{Exercise, Lesson, TestedAnswers};
+pub use hand_in::{HandIn, HandInError, HandedStep};
+pub use lab::{Lab, LabAnswer, LabStep, TestedAnswers};
 pub use question::Desk;
+pub use task::{LabQuantity, LabTask, LoopAsks};

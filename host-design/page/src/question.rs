@@ -11,9 +11,11 @@ use upright_design::table::gains_source;
 use crate::changes::{changed, differences};
 use crate::designed::{DeskDesign, ShownRun};
 use crate::fingerprint::{Fingerprint, PullRounding};
-use crate::lesson::Exercise;
+use crate::hand_in::sealed;
+use crate::lab::{shown, varied};
 use crate::refusal::{FILE, PageRefusal, failed};
 use crate::sketch::sketch;
+use crate::task::LabTask;
 
 /// A question about a rig: the text of its file, and what is wanted.
 #[derive(Debug, Deserialize)]
@@ -24,6 +26,8 @@ struct Question {
     toml: String,
     /// The motions that are stored beside it, if there are any.
     motions: Option<String>,
+    /// A person's own gains K, one per state, in place of those of the laws.
+    own: Option<Vec<f64>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -54,8 +58,14 @@ enum Asked {
     Poles,
     /// The trust report in short form, as far as its step of this number.
     Verify { step: usize },
-    /// Whether this answer to an exercise is right.
-    Mark { exercise: Exercise, answer: Vec<f64> },
+    /// What the lab in this text is.
+    Lab,
+    /// The text with the numbers of a student, whose seed this is.
+    Vary { vary: Vec<(String, f64)>, seed: String },
+    /// Whether an answer to a step of a lab is right: numbers, or what the text has become of the lab's `rig`.
+    Mark { task: LabTask, rig: String, answer: Vec<f64> },
+    /// A file for the teacher.
+    HandIn { work: Value },
     /// The gain table as Rust source, as `upright design` writes it.
     Table,
     /// Table and controller as a C header, as `upright export` writes it.
@@ -67,7 +77,7 @@ enum Asked {
 /// Answers questions; keeps the last design, because the next question is often about the same rig.
 #[derive(Debug, Default)]
 pub struct Desk {
-    designed: Option<(String, DeskDesign)>,
+    designed: Option<(String, Option<Vec<f64>>, DeskDesign)>,
 }
 
 impl Desk {
@@ -81,6 +91,9 @@ impl Desk {
     }
 
     fn answered(&mut self, question: &Question) -> Result<Value, PageRefusal> {
+        if let Asked::Lab = question.wanted {
+            return Ok(json!({ "lab": shown(&question.toml).map_err(PageRefusal::Lab)? }));
+        }
         let rig = Rig::from_toml(&question.toml, Path::new(FILE))?;
         rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
         let motions = question.motions.as_deref();
@@ -91,39 +104,44 @@ impl Desk {
                 Rig::from_toml(&text, Path::new(FILE))?;
                 Ok(json!({ "toml": text }))
             }
-            Asked::Design(run) => self.designed(&question.toml, &rig)?.gains_and_run(&rig, run),
+            Asked::Design(run) => self.designed(question, &rig)?.gains_and_run(&rig, run),
             Asked::Csv { law, run } => {
-                let text = self.designed(&question.toml, &rig)?.csv(&rig, law, run)?;
+                let text = self.designed(question, &rig)?.csv(&rig, law, run)?;
                 Ok(json!({ "text": text }))
             }
             Asked::Differences { from } => Ok(json!({ "differences": differences(from, &question.toml)? })),
-            Asked::Survival { law } => self.designed(&question.toml, &rig)?.survival(&rig, law),
-            Asked::Poles => self.designed(&question.toml, &rig)?.poles(&rig),
-            &Asked::Verify { step } => self.designed(&question.toml, &rig)?.verify(&rig, step),
-            Asked::Mark { exercise, answer } => exercise.marked(&question.toml, answer),
+            Asked::Survival { law } => self.designed(question, &rig)?.survival(&rig, law),
+            Asked::Poles => self.designed(question, &rig)?.poles(&rig),
+            &Asked::Verify { step } => self.designed(question, &rig)?.verify(&rig, step),
+            // Answered above: its text is no rig.
+            Asked::Lab => Ok(Value::Null),
+            Asked::Vary { vary, seed } => Ok(json!({ "toml": varied(&question.toml, vary, seed)? })),
+            Asked::Mark { task, rig, answer } => task.marked(rig, &question.toml, answer),
+            Asked::HandIn { work } => Ok(json!({ "text": sealed(work.clone()) })),
             Asked::Table => {
-                let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
+                let table = self.designed(question, &rig)?.table_with(&rig, motions)?;
                 Ok(json!({ "text": gains_source(&rig, &table) }))
             }
             Asked::Header => {
-                let table = self.designed(&question.toml, &rig)?.table()?;
+                let table = self.designed(question, &rig)?.table()?;
                 Ok(json!({ "text": c_header(&rig, table)? }))
             }
             &Asked::Fingerprint { rounding, ticks } => {
-                let table = self.designed(&question.toml, &rig)?.table_with(&rig, motions)?;
+                let table = self.designed(question, &rig)?.table_with(&rig, motions)?;
                 Ok(json!(Fingerprint::compute(&rig, &table, rounding, ticks)?))
             }
         }
     }
 
-    /// The design of `rig`, whose file has the text `toml`.
-    fn designed(&mut self, toml: &str, rig: &Rig) -> Result<&mut DeskDesign, PageRefusal> {
-        let kept = self.designed.take().filter(|(text, _)| text == toml);
+    /// The design of `rig`, whose file is that of the question, with a person's own gains if there are any.
+    fn designed(&mut self, question: &Question, rig: &Rig) -> Result<&mut DeskDesign, PageRefusal> {
+        let Question { toml, own, .. } = question;
+        let kept = self.designed.take().filter(|(text, gains, _)| text == toml && gains == own);
         let designed = match kept {
-            Some((_, designed)) => designed,
-            None => DeskDesign::design(rig)?,
+            Some((.., designed)) => designed,
+            None => DeskDesign::design(rig)?.with_own(rig, own.as_deref())?,
         };
-        Ok(&mut self.designed.insert((toml.to_owned(), designed)).1)
+        Ok(&mut self.designed.insert((toml.clone(), own.clone(), designed)).2)
     }
 }
 

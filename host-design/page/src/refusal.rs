@@ -48,6 +48,10 @@ pub(crate) enum PageRefusal {
     NoBoard,
     #[error("{0}")]
     Twin(String),
+    #[error("{0}")]
+    Lab(String),
+    #[error("the poles of this rig without a controller cannot be computed: change its numbers")]
+    Poles,
     #[error("give {0} numbers, with blanks between them")]
     Answer(usize),
 }

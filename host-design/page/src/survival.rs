@@ -1,6 +1,6 @@
 //! How much a closed loop stands, in two numbers that a person can picture.
 
-use serde_json::{Value, json};
+use serde::Serialize;
 use upright::table::Law;
 use upright_design::rig::Rig;
 use upright_design::simulate::HandPush;
@@ -13,9 +13,18 @@ const FROM_S: f64 = 0.2;
 /// Relative precision of the tilt: a sentence has two digits.
 const RELATIVE: f64 = 0.02;
 
-/// The largest lean of a single link, whichever leans (rad), from which the controller comes back, and the hardest touch
-/// at the end of the last link (N, for 50 ms) after which the whole firmware still balances.
-pub(crate) fn survival(rig: &Rig, table: &TableValues, law: Law) -> Result<Value, VerifyError> {
+/// How much a loop stands.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct LoopSurvival {
+    /// The largest lean of a single link, whichever leans, from which the controller comes back (rad).
+    pub(crate) tilt_rad: f64,
+    /// The hardest touch at the end of the last link (for 50 ms) after which the whole firmware still balances (N);
+    /// none if it survives the hardest one that is tried.
+    pub(crate) touch_n: Option<f64>,
+}
+
+/// Finds how much the loop of `law` stands.
+pub(crate) fn survival(rig: &Rig, table: &TableValues, law: Law) -> Result<LoopSurvival, VerifyError> {
     let settings = AttractionSettings { relative: RELATIVE, ..AttractionSettings::default() };
     let tilts = largest_tilts(rig, table, law, &settings)?;
     let links = tilts.len();
@@ -23,5 +32,5 @@ pub(crate) fn survival(rig: &Rig, table: &TableValues, law: Law) -> Result<Value
     let push = HandPush { body: links, along: 1.0, force_n: 1.0, from_s: FROM_S, duration_s: TOUCH_S };
     let ended = PushSearch { rig, table, law, push, seed: 1 }.first(true)?;
     let touch_n = ended.map(|(force_n, _)| force_n / (1.0 + PushSearch::RELATIVE));
-    Ok(json!({ "tilt_rad": tilt_rad, "touch_n": touch_n }))
+    Ok(LoopSurvival { tilt_rad, touch_n })
 }

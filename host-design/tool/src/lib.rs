@@ -17,6 +17,9 @@
 //! | [`identified`] | results of an identification, as text, JSON, page and rig file |
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`site`] | the whole of it in a page, with nothing to install |
+//! | [`marking`] | a class's labs, run again |
+//! | [`progress`] | what a long computation tells meanwhile |
+//! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
 //! use upright_tool::figure::{Curve, Figure, Axis, Panel};
@@ -39,6 +42,7 @@ pub mod image;
 pub mod import;
 pub mod in_the_loop;
 pub mod markdown;
+pub mod marking;
 pub mod monitor;
 mod policy;
 pub mod report;

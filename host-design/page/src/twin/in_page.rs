@@ -28,8 +28,9 @@ const VIEWER: u64 = 1;
 #[derive(Debug, Deserialize)]
 #[serde(tag = "twin", rename_all = "kebab-case")]
 enum TwinQuestion {
-    /// Switches the power of another rig on, raised or hanging. `since_1970_s` is the time (s).
-    Start { toml: String, motions: Option<String>, upright: bool, since_1970_s: f64 },
+    /// Switches the power of another rig on, raised or hanging. `since_1970_s` is the time (s); `own` are a person's own
+    /// gains K.
+    Start { toml: String, motions: Option<String>, own: Option<Vec<f64>>, upright: bool, since_1970_s: f64 },
     /// What the person asks for, then the ticks that are due after `passed_s` of real time, but at most `most_ticks`.
     /// A person who `is_silent` for too long is no longer in command.
     Run { asked: Vec<PageRequest>, passed_s: f64, most_ticks: u32, is_silent: bool },
@@ -74,8 +75,8 @@ impl InPage {
 
     fn answered(&mut self, question: TwinQuestion) -> Result<Value, PageRefusal> {
         match question {
-            TwinQuestion::Start { toml, motions, upright, since_1970_s } => {
-                let twin = Twin::start(&toml, motions.as_deref(), upright, since_1970_s)?;
+            TwinQuestion::Start { toml, motions, own, upright, since_1970_s } => {
+                let twin = Twin::start(&toml, motions.as_deref(), own.as_deref(), (upright, since_1970_s))?;
                 let hello = twin.hello();
                 self.twin = Some(twin);
                 Ok(json!({ "hello": hello, "you": VIEWER }))
@@ -101,12 +102,12 @@ impl Twin {
     fn start(
         toml: &str,
         motions: Option<&str>,
-        upright: bool,
-        since_1970_s: f64,
+        own: Option<&[f64]>,
+        (upright, since_1970_s): (bool, f64),
     ) -> Result<Self, PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
         rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
-        let table = DeskDesign::design(&rig)?.table_with(&rig, motions)?;
+        let table = DeskDesign::design(&rig)?.with_own(&rig, own)?.table_with(&rig, motions)?;
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, law) };
         let machine = SimulatedMachine {

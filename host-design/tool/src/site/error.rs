@@ -23,9 +23,9 @@ pub enum SiteError {
     /// The compiler reports errors.
     #[error("the page's module cannot be built; the compiler says:\n{0}")]
     Compiler(String),
-    /// A file is no exercise.
+    /// A file is no lab.
     #[error("{}: {why}", path.display())]
-    Lesson {
+    Lab {
         /// Path of the file.
         path: PathBuf,
         /// What is wrong with it.

@@ -12,7 +12,7 @@
 mod error;
 mod examples;
 mod files;
-mod lessons;
+mod labs;
 mod module;
 mod motions;
 mod packed;
@@ -21,6 +21,7 @@ mod twin;
 
 pub use error::SiteError;
 pub use examples::examples;
-pub use lessons::lessons;
+pub(crate) use files::json_files;
+pub use labs::{lab, labs};
 pub use module::module;
 pub use page::{Example, page};

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 use upright::protocol::BAUD;
-use upright_page::{Desk, Lesson};
+use upright_page::{Desk, Lab};
 
 use super::motions::without_knots;
 use super::packed::packed;
@@ -31,7 +31,7 @@ const SCRIPTS: [&str; 18] = [
     include_str!("page/live.js"),
     include_str!("page/serial.js"),
     include_str!("page/balance.js"),
-    include_str!("page/lessons.js"),
+    include_str!("page/labs.js"),
     include_str!("page/trust.js"),
     include_str!("page/desk.js"),
 ];
@@ -52,11 +52,11 @@ pub struct Example {
     pub motions: Option<String>,
 }
 
-/// The page with this module, these examples and these exercises.
+/// The page with this module, these examples and these labs.
 ///
 /// Its content security policy lets it run the scripts and styles in it, which it names by their hashes, and the
 /// module; it cannot ask any computer for anything.
-pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
+pub fn page(module: &[u8], examples: &[Example], labs: &[Lab]) -> String {
     // The rules of the figures come first: the colours of the dark scheme replace theirs.
     let style = [style_sheet().as_str(), COLOURS_CSS, STYLE].concat();
     let twin = TwinPage::new();
@@ -72,17 +72,20 @@ pub fn page(module: &[u8], examples: &[Example], lessons: &[Lesson]) -> String {
         source(&twin.style)
     );
     let (shown, knots) = shown(examples);
+    // The page puts back what its own script has, too.
+    let texts = json!({
+        "twin": twin.html.replacen(&shared, SHARED_MARK, 1),
+        "labs": labs.iter().map(Lab::shown).collect::<Vec<_>>(),
+    });
     let parts = [
         ("{policy}", policy),
         ("{style}", style),
         ("{baud}", BAUD.to_string()),
         ("{examples}", embedded(&shown)),
         ("{first}", embedded(&first(examples))),
-        ("{lessons}", embedded(&lessons)),
         ("{worker}", embedded(&bare(WORKER))),
-        // The page puts back what its own script has, too.
-        ("{twin}", embedded(&twin.html.replacen(&shared, SHARED_MARK, 1))),
         ("{theme}", embedded(&page_theme())),
+        ("{texts}", base64(&packed(embedded(&texts).as_bytes()))),
         ("{motions}", base64(&packed(&knots))),
         ("{module}", base64(&packed(module))),
         ("{script}", script),
@@ -137,7 +140,7 @@ mod tests {
         let toml = "name = \"</script>\"".to_owned();
         let page = page(b"module", &[Example { name: "mine".to_owned(), toml, motions: None }], &[]);
         assert!(page.contains("default-src 'none'") && page.contains("<\\/script>"));
-        assert_eq!(page.matches("</script>").count(), 9);
+        assert_eq!(page.matches("</script>").count(), 8);
         assert!(page.trim_end().ends_with("</html>"), "a mark is missing in the page");
         for request in ["src=\"", "@import", "fetch(", "XMLHttpRequest", "https://", "url("] {
             assert!(!page.contains(request), "{request}");

@@ -15,6 +15,7 @@ use upright_tool::campaign::Defect;
 use upright_tool::commission::{CommissionStep, Planted};
 use upright_tool::image::{PICO_BALANCING_CYCLES, PICO_MOTION_CYCLES};
 use upright_tool::monitor::{MonitorAction, action, request};
+use upright_tool::site::labs;
 
 use crate::documents::{read, root};
 use crate::published::rig_path;
@@ -165,6 +166,15 @@ fn the_page_about_injection_holds_the_kinds_of_defects() {
 fn the_page_about_commissioning_holds_steps_and_planted_defects() {
     hold("docs/commission.md", "steps", &steps());
     hold("docs/commission.md", "planted", &planted());
+}
+
+#[test]
+fn the_page_about_labs_holds_those_of_the_page() {
+    let mut table = "| lab | minutes | what one can do afterwards |\n|---|---|---|\n".to_owned();
+    for (number, lab) in (1..).zip(labs(&root().join("lessons")).unwrap()) {
+        table += &format!("| {number} {} | {} | {} |\n", lab.title, lab.minutes, lab.goals);
+    }
+    hold("docs/labs.md", "labs", &table);
 }
 
 #[test]

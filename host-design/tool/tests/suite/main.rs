@@ -43,6 +43,7 @@ mod site_at_length;
 mod site_bits;
 mod site_desk;
 mod site_exercises;
+mod site_labs;
 mod site_pace;
 mod site_page;
 mod site_picture;

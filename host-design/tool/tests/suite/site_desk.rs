@@ -98,7 +98,7 @@ fn a_rig_that_an_example_an_exercise_or_a_field_replaces_comes_back_with_undo() 
     click(&mut browser, "#undo");
     designed(&mut browser, &own());
     // An exercise, and the keys; also after the page is loaded again.
-    click(&mut browser, "#lesson-list button");
+    click(&mut browser, "#lesson-list button:nth-child(2)");
     designed(&mut browser, &read("single-quanser-ip02"));
     let page = address(&mut browser);
     reload(&mut browser, &page);

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use upright_page::Desk;
 use upright_test_support::limits::{PATIENCE, output};
-use upright_tool::site::{examples, lessons, module, page};
+use upright_tool::site::{examples, labs, module, page};
 
 use crate::report_devtools::Browser;
 use crate::site_bits::is_wanted;
@@ -60,8 +60,8 @@ pub(crate) fn opened_in(width: u32) -> Option<(Browser, tempfile::TempDir)> {
     let mut browser = is_wanted(what).then(|| Browser::for_test_of(what)).flatten()?;
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("index.html");
-    let (examples, lessons) = (examples(&root().join("rigs")), lessons(&root().join("lessons")));
-    let text = page(&module().unwrap(), &examples.unwrap(), &lessons.unwrap());
+    let (examples, labs) = (examples(&root().join("rigs")), labs(&root().join("lessons")));
+    let text = page(&module().unwrap(), &examples.unwrap(), &labs.unwrap());
     std::fs::write(&file, &text).unwrap();
     let compressed = miniz_oxide::deflate::compress_to_vec(text.as_bytes(), 9).len();
     eprintln!("page: {} bytes, {compressed} compressed", text.len());
@@ -147,7 +147,7 @@ fn the_trust_report_of_the_page_is_that_of_this_computer_and_goes_with_its_rig()
 #[test]
 fn an_answer_to_an_exercise_is_marked_in_the_page() {
     let Some((mut browser, _folder)) = opened() else { return };
-    browser.value("document.querySelectorAll('#lesson-list button')[0].click()");
+    browser.value("document.querySelectorAll('#lesson-list button')[1].click()");
     until(&mut browser, "upright.desk.design.states === 4 && !document.getElementById('lesson').hidden");
     let mut mark = |answer: &str, said: &str| {
         browser.value(&format!(

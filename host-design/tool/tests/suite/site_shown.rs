@@ -35,7 +35,7 @@ fn without_comments(file: &str) -> String {
 }
 
 /// What the page has saved as `file`, once it is there.
-fn saved(file: &Path) -> String {
+pub(crate) fn saved(file: &Path) -> String {
     until_there(&format!("{} is saved", file.display()), || {
         std::fs::read_to_string(file).ok().filter(|text| !text.is_empty())
     })

@@ -9,6 +9,7 @@ mod faults;
 mod firmware;
 mod identify;
 mod import;
+mod mark;
 mod reading;
 mod report;
 mod robust;
@@ -75,6 +76,7 @@ enum UprightCommand {
     Shake(shake::ShakeCommand),
     Identify(identify::IdentifyCommand),
     Import(import::ImportCommand),
+    Mark(mark::MarkCommand),
     Simulate(simulate::SimulateCommand),
     Site(site::SiteCommand),
     Twin(twin::TwinCommand),
@@ -108,6 +110,7 @@ fn main() -> ExitCode {
         UprightCommand::Shake(command) => command.run(),
         UprightCommand::Identify(command) => command.run(),
         UprightCommand::Import(command) => command.run(),
+        UprightCommand::Mark(command) => command.run(),
         UprightCommand::Simulate(command) => command.run(),
         UprightCommand::Site(command) => command.run(),
         UprightCommand::Twin(command) => command.run(),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use upright_command::project::checkout;
 use upright_design::table::write_atomically;
-use upright_tool::site::{examples, lessons, module, page};
+use upright_tool::site::{examples, labs, module, page};
 
 use upright_command::Failure;
 use upright_command::progress::with_spinner;
@@ -17,7 +17,7 @@ use upright_command::progress::with_spinner;
 #[derive(Args)]
 #[command(before_help = "\
 Examples:
-  upright site --out site     writes site/index.html, with the rigs of rigs/ and the exercises of lessons/")]
+  upright site --out site     writes site/index.html, with the rigs of rigs/ and the labs of lessons/")]
 pub(crate) struct SiteCommand {
     /// Folder for the page; it is created if it does not exist
     #[arg(long, value_name = "FOLDER")]
@@ -27,9 +27,9 @@ pub(crate) struct SiteCommand {
 impl SiteCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let examples = examples(&checkout()?.join("rigs"))?;
-        let lessons = lessons(&checkout()?.join("lessons"))?;
+        let labs = labs(&checkout()?.join("lessons"))?;
         let module = with_spinner("compiling the page's module", module)?;
-        let page = page(&module, &examples, &lessons);
+        let page = page(&module, &examples, &labs);
         std::fs::create_dir_all(&self.out)
             .map_err(|error| Failure::argument(format!("{}: {error}", self.out.display())))?;
         let path = self.out.join("index.html");

@@ -7,7 +7,7 @@ const SCOPES = 'upright scopes';
 function twinPage() {
   const own = document.scripts[document.scripts.length - 1].textContent;
   const shared = own.slice(own.indexOf('const modules'), own.indexOf("'end of what is shared'"));
-  return JSON.parse(embedded('twin-page')).replace('{shared}', () => shared);
+  return texts().twin.replace('{shared}', () => shared);
 }
 
 class Twin {

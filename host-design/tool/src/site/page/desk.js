@@ -6,11 +6,14 @@ const LEAST_MS = 16;
 const KEPT = 'upright rig'; // name in the tab's store
 const LARGEST_FILE = 1e6; // bytes
 const NEEDS_TABLE = ['save-table', 'save-header', 'save-csv', 'balance', 'connect', 'verify'];
+// What would be of the designed gains, and not of a person's own.
+const OF_DESIGN = ['save-table', 'save-header', 'verify', 'connect'];
 const SHOWN = ['stage', 'plots', 'figures', 'gains', 'poles', 'changes'];
 
-// `linked` is the rig file that the address holds; what is shown `isOld` after a wrong input.
-const desk = { sketch: null, design: null, poles: null, survival: null, linked: null, isOld: false };
-let [checker, designer, surveyor, twin, trust, live, imperfections] = new Array(7).fill(null);
+// `linked` is the rig file that the address holds, `own` are a person's own gains; what is shown `isOld` after a wrong
+// input.
+const desk = { sketch: null, design: null, poles: null, survival: null, linked: null, isOld: false, own: null };
+let [checker, designer, surveyor, twin, trust, live, imperfections, labs] = new Array(8).fill(null);
 
 const editor = new Editor(() => changed());
 const comparison = new Comparison();
@@ -73,7 +76,7 @@ function changed() {
   // An address that holds another rig would win over this one when the page is loaded again.
   if (desk.linked !== null && editor.value !== desk.linked) {
     desk.linked = null;
-    history.replaceState(null, '', withoutRig());
+    history.replaceState(null, '', withoutHash());
   }
   trust.forget();
   comparison.changes();
@@ -91,6 +94,7 @@ function checked(answer) {
 // What can be shown of a rig before it is designed.
 function sketched(answer) {
   desk.sketch = answer;
+  if (examples.some(({ name }) => name === answer.rig)) byId('example').value = answer.rig;
   form.show(answer.fields);
   weights.show(answer.weights);
   dials.show(answer.dials, answer.rig, answer.lengths_m.length);
@@ -110,8 +114,8 @@ function redesign() {
   byId('verdict').className = 'waits';
   const toml = editor.value;
   tell('designing …');
-  designer.ask('design', { ask: 'design', toml, ...disturbed() }, (answer, ms) => {
-    if (answer.failed !== undefined) return toml === editor.value ? wrong(answer.failed) : undefined;
+  designer.ask('design', { ask: 'design', toml, own: desk.own, ...disturbed() }, (answer, ms) => {
+    if (answer.failed !== undefined) return toml === editor.value ? undesigned(answer.failed) : undefined;
     designed(answer, ms, toml);
     return designer.ask('poles', { ask: 'poles', toml }, (poles) => {
       if (poles.failed !== undefined) return;
@@ -119,6 +123,22 @@ function redesign() {
       showDesign();
     });
   });
+}
+
+// Own gains may be too many or too few for the rig.
+function undesigned(failed) {
+  if (desk.own === null) return wrong(failed);
+  byId('own-said').textContent = plain(failed.why);
+  return outdate(failed.why);
+}
+
+// A person's own gains in place of the designed ones, which null brings back.
+function useOwn(gains) {
+  desk.own = gains;
+  byId('own-said').textContent = '';
+  byId('use-designed').hidden = gains === null;
+  comparison.changes();
+  redesign();
 }
 
 function designed(answer, ms, toml) {
@@ -130,9 +150,9 @@ function designed(answer, ms, toml) {
   }
   if (answer.crc === null) tell(`no table: ${plain(answer.no_table)}`, true);
   else tell(`designed in ${(ms / 1e3).toFixed(2)} s`);
-  for (const id of NEEDS_TABLE) byId(id).disabled = answer.crc === null;
+  for (const id of NEEDS_TABLE) byId(id).disabled = answer.crc === null || (desk.own !== null && OF_DESIGN.includes(id));
   byId('stage').classList.remove('old');
-  if (toml !== live.wanted?.toml && answer.crc !== null) live.show({ toml, motions: null });
+  if (answer.crc !== null && (toml !== live.wanted?.toml || desk.own !== live.wanted.own)) live.show({ toml, motions: null, own: desk.own });
   showLoop();
   showDesign();
   survey(toml);
@@ -143,7 +163,7 @@ function survey(toml) {
   desk.survival = null;
   if (chosen()?.run?.fell !== false || desk.sketch.lengths_m.length === 0) return showAbilities();
   surveyor ??= new Thread(live.module);
-  return surveyor.ask('survival', { ask: 'survival', toml, law: byId('law').value }, (answer) => {
+  return surveyor.ask('survival', { ask: 'survival', toml, own: desk.own, law: byId('law').value }, (answer) => {
     if (toml !== editor.value || answer.failed !== undefined) return;
     desk.survival = answer;
     showAbilities();
@@ -161,10 +181,10 @@ function showAbilities() {
 
 // What the run shows, and how much the loop stands, in plain words.
 function inWords({ fell }) {
-  if (fell) return 'falls';
+  if (fell) return desk.own === null ? 'falls' : 'your K: falls';
   if (desk.sketch.unusual.length > 0) return 'survives, if its numbers are right:';
   const { tilt_rad: tilt, touch_n: touch } = desk.survival ?? {};
-  const parts = ['survives', ...(tilt === undefined ? [] : [`tilt up to ${Number((tilt * DEGREES).toPrecision(2))}°`]),
+  const parts = [desk.own === null ? 'survives' : 'your K survives', ...(tilt === undefined ? [] : [`tilt up to ${Number((tilt * DEGREES).toPrecision(2))}°`]),
     ...(touch === undefined || touch === null ? [] : [`touch of ${Number(touch.toPrecision(2))} N`])];
   return parts.join(' · ');
 }
@@ -209,7 +229,7 @@ function showLoop() {
 // What is kept of the loop as it is now, to be compared with another one.
 function snapshot() {
   const law = chosen();
-  return { name: `${desk.sketch.rig}, ${law.title}`, lengths: desk.sketch.lengths_m, travel: desk.sketch.travel_m, rows: law.run?.rows ?? null,
+  return { name: `${desk.sketch.rig}, ${desk.own === null ? law.title : 'your K'}`, lengths: desk.sketch.lengths_m, travel: desk.sketch.travel_m, rows: law.run?.rows ?? null,
     abilities: abilities({ survival: desk.survival ?? {}, law }) };
 }
 
@@ -252,7 +272,7 @@ function save(name, text, type = 'text/plain') {
 
 // What `upright design`, `upright export` and `upright simulate --csv` write.
 async function exported(kind) {
-  const answer = await designer.answerTo({ ask: kind, toml: editor.value, law: byId('law').value, ...disturbed() });
+  const answer = await designer.answerTo({ ask: kind, toml: editor.value, law: byId('law').value, own: desk.own, ...disturbed() });
   if (answer.failed !== undefined) tell(answer.failed.why, true);
   return answer.text ?? null;
 }
@@ -276,14 +296,29 @@ function replace(toml, what) {
   return isOwn && value !== toml ? notice(`${what} has taken the place of your rig.`, { undo: (event) => editor.step(event, true) }) : undefined;
 }
 
-async function openFile(file) {
-  if (file.size > LARGEST_FILE) return notice(`${file.name} is too large for a rig file.`, {}, true);
-  return replace(await file.text(), file.name);
+// Puts a rig or a lab into the address.
+async function copyLink(kind, toml) {
+  history.replaceState(null, '', linkTo(kind, toml));
+  await navigator.clipboard?.writeText(location.href).catch(() => {});
+  tell(`the address of this page now holds the ${kind}, and is in the clipboard where the browser allows it`);
 }
 
-// The rig in the address, if there is one. It takes no work away without a word.
+// The lab in the address, if there is one.
+function openLab() {
+  const link = inAddress('lab');
+  if (link?.why !== undefined) notice(link.why, {}, true);
+  else if (link !== null) labs.add(link.toml);
+}
+
+async function openFile(file) {
+  if (file.size > LARGEST_FILE) return notice(`${file.name} is too large for a rig file.`, {}, true);
+  const text = await file.text();
+  return /^\[\[step\]\]/m.test(text) ? labs.add(text) : replace(text, file.name);
+}
+
+// The rig in the address, if there is one. It takes no work away without a word; nor does a lab.
 function openLink() {
-  const link = rigOfLink();
+  const link = inAddress('rig');
   if (link === null) return false;
   if (link.why !== undefined) {
     notice(link.why, {}, true);
@@ -300,7 +335,7 @@ function openLink() {
   notice('The link holds another rig than the one that you have changed here.', {
     'open the rig of the link': open,
     'keep mine': () => {
-      history.replaceState(null, '', withoutRig());
+      history.replaceState(null, '', withoutHash());
       notice('');
     },
   });
@@ -329,6 +364,13 @@ function listenToFiles() {
 }
 
 function listen() {
+  byId('use-own').addEventListener('click', () => {
+    const gains = byId('own').value.split(/[\s;]+/).filter((word) => word !== '').map(numberOf);
+    const wrong = gains.find(({ why }) => why !== undefined);
+    if (wrong === undefined) useOwn(gains.map(({ value }) => value));
+    else byId('own-said').textContent = wrong.why;
+  });
+  byId('use-designed').addEventListener('click', () => useOwn(null));
   byId('keep').addEventListener('click', () => { snapshots.keep(snapshot()); });
   byId('example').replaceChildren(...examples.map(({ name }) => element('option', { value: name, textContent: name })));
   byId('example').addEventListener('change', ({ target }) => {
@@ -346,7 +388,7 @@ function listen() {
   }
   byId('law').addEventListener('change', () => { drawFigures(); trust.show(); survey(editor.value); });
   byId('balance').addEventListener('click', () => {
-    twin.open({ toml: editor.value, motions: motions(), upright: byId('raised').checked, since_1970_s: Date.now() / 1e3 });
+    twin.open({ toml: editor.value, motions: desk.own === null ? motions() : null, own: desk.own, upright: byId('raised').checked, since_1970_s: Date.now() / 1e3 });
   });
   byId('connect').hidden = navigator.serial === undefined;
   byId('no-serial').hidden = navigator.serial !== undefined;
@@ -361,13 +403,11 @@ function listen() {
   byId('save-table').addEventListener('click', () => saveExported('table', 'gains.rs'));
   byId('save-header').addEventListener('click', () => saveExported('header', 'controller.h'));
   byId('save-csv').addEventListener('click', () => saveExported('csv', 'run.csv', 'text/csv'));
-  byId('link').addEventListener('click', async () => {
+  byId('link').addEventListener('click', () => {
     desk.linked = editor.value;
-    history.replaceState(null, '', linkTo(editor.value));
-    await navigator.clipboard?.writeText(location.href).catch(() => {});
-    tell('the address of this page now holds the rig, and is in the clipboard where the browser allows it');
+    copyLink('rig', editor.value);
   });
-  addEventListener('hashchange', openLink);
+  addEventListener('hashchange', () => { openLink(); openLab(); });
   let resized = null;
   addEventListener('resize', () => {
     clearTimeout(resized);
@@ -382,9 +422,9 @@ function first() {
   byId('example').value = name;
   if (!editor.goOn(store()?.getItem(KEPT))) editor.set(toml, null, { name, text: toml });
   // This one can be shown, and begins to move, before anything else is computed.
-  if (editor.value === toml && rigOfLink() === null) {
+  if (editor.value === toml && inAddress('rig') === null) {
     sketched(sketch);
-    live.show({ toml, motions: null });
+    live.show({ toml, motions: null, own: null });
   }
   if (!openLink()) {
     const said = [...byId('notice').childNodes];
@@ -408,14 +448,10 @@ function begin() {
     // A store that is too small keeps nothing.
     try { store()?.setItem(KEPT, editor.kept()); } catch {}
   });
-  const begins = (name) => {
-    byId('example').value = name;
-    const example = examples.find((one) => one.name === name);
-    if (example !== undefined) replace(example.toml, `${name}, the rig of the exercise,`);
-  };
-  new Lessons(begins, (question) => designer.answerTo(question), () => twin.falls);
   first();
+  labs = new Labs((toml, title) => replace(toml, `The rig of “${title}”`), (question) => designer.answerTo(question), () => twin.falls);
   twin.goOn(editor.value);
+  openLab();
   return module;
 }
 

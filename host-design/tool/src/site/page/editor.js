@@ -10,8 +10,8 @@ function element(name, properties, ...children) {
   return made;
 }
 
-// Line numbers beside the text; the line of an error stands out. Whatever changes the text, undo takes it back. `origin`
-// is what the person began with: its name and text.
+// Line numbers beside the text; the line of an error stands out. Whatever changes the text, undo takes it back.
+// `origin` is what the person began with: its name and text.
 class Editor {
   constructor(change) {
     Object.assign(this, { change, text: byId('toml'), lines: byId('lines'), wrong: null, past: new Past(), origin: { name: '', text: '' } });

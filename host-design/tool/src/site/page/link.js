@@ -14,6 +14,9 @@ function lettersOf(bytes) {
 // What is embedded as base64 of packed bytes.
 const bytesOf = (id) => decoded(bytesOfLetters(embedded(id).trim()));
 
+// Texts that are not needed at once.
+const texts = () => JSON.parse(new TextDecoder().decode(bytesOf('texts')));
+
 // The tab's store, from which a page that is loaded again goes on; null where the person forbids it.
 function store() {
   try { return sessionStorage; } catch { return null; }

@@ -11,6 +11,7 @@ const NUDGE_AFTER_MS = 4500;
 const NUDGE_MS = 180;
 const NUDGE_SIZE = [0.3, 0.12]; // in lengths of the chain: of the end of at most two links, or of the cart
 const BACK_MS = 4000; // time after a fall until it is put back up
+const IDLE_MS = 30; // between two pictures
 const AT_REST = { isOn: false, isKnown: true, isUp: true, force_n: 0, fallen: null, t_s: 0 };
 
 class Live {
@@ -23,7 +24,14 @@ class Live {
     useTheme(this.theme);
     byId('again').addEventListener('click', () => this.putBack());
     document.addEventListener('visibilitychange', () => this.machine({ do: 'pause', on: document.hidden }));
-    const frame = () => { requestAnimationFrame(frame); this.draw(); };
+    let drawn = 0;
+    const frame = (now) => {
+      requestAnimationFrame(frame);
+      // While nobody pulls it, fewer pictures do.
+      if (now - drawn < (this.view?.grip ? 0 : IDLE_MS)) return;
+      drawn = now;
+      this.draw();
+    };
     requestAnimationFrame(frame);
   }
 

@@ -40,8 +40,8 @@ class Changes {
   }
 }
 
-// Switches a rig on and keeps it running, from what was kept of it, if that is not null, and `keeps` what a page that is
-// loaded again needs; returns why it cannot, if it cannot.
+// Switches a rig on and keeps it running, from what was kept of it, if that is not null, and `keeps` what a page that
+// is loaded again needs; returns why it cannot, if it cannot.
 function run(rig, theme, port, { kept, keeps }) {
   const told = answered('twin', { twin: 'start', ...rig });
   if (told.failed !== undefined) return told;
