@@ -8,6 +8,10 @@ use crate::supervision::inhibits::Inhibits;
 use crate::supervision::stilling::LONGEST_S;
 use crate::table::{StillingGains, SwingUp};
 
+/// After a command, the links are still when they have been slow for this part of `arm_ticks`, twice as long as before
+/// they are raised: links without friction swing on when the motor is off. After a fall it is all of it, because the
+/// motor may have to be jogged before the links can be stilled again.
+const SLOW_PART_OF_ARM_TICKS: u32 = 2;
 /// The links are still only while the base is within this share of the rail's length from the middle.
 const MIDDLE: f32 = 0.05;
 
@@ -84,12 +88,14 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
         self.stiller.update(counts, self.table, gains, driven)
     }
 
-    /// Whether the links hang and are slow, as a motion that raises them requires, with the base near the middle.
+    /// Whether the links hang and are slow, with the base near the middle.
     fn hangs_still(&self, counts: &[i32; NY]) -> bool {
+        let has_fallen = self.supervisor.fault().is_some();
+        let slow_ticks = self.table.limits.arm_ticks / if has_fallen { 1 } else { SLOW_PART_OF_ARM_TICKS };
         let [low, high] = self.table.limits.rail_m;
         let near = [-MIDDLE * (high - low), MIDDLE * (high - low)];
         links_hang(counts, &self.table.sensors)
-            && !self.moves()
+            && self.calibration.slow_ticks() >= slow_ticks
             && self.off_centre_inhibit(counts, near).is_empty()
     }
 }

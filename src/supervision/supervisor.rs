@@ -63,7 +63,9 @@ impl Supervisor {
             return;
         }
         self.positions_known &= !cause.fault.loses_positions() && self.state != State::Homing;
-        self.cause = Some(cause);
+        // A fall of this tick came first; one before is no longer why the motor is off.
+        let falls_now = |fall: &Cause| self.state == State::Stilling && fall.tick == cause.tick;
+        self.cause = self.cause.filter(falls_now).or(Some(cause));
         self.state = State::Fault;
     }
 
@@ -472,8 +474,16 @@ mod tests {
         // What turns the motor off counts, not the fall before.
         supervisor.fall(cause(super::Fault::Rail));
         assert_eq!(supervisor.fault(), None, "it does not fall while it is stilled");
-        supervisor.trip(cause(super::Fault::Driver));
+        supervisor.trip(Cause { fault: super::Fault::Driver, tick: 8, sensor: None });
         assert_eq!((supervisor.state(), supervisor.fault()), (Fault, Some(super::Fault::Driver)));
+        let mut falling = Supervisor { state: Balancing, ..supervisor };
+        falling.fall(cause(super::Fault::Angle));
+        falling.trip(cause(super::Fault::Table));
+        assert_eq!(
+            (falling.state(), falling.fault()),
+            (Fault, Some(super::Fault::Angle)),
+            "in the same tick"
+        );
     }
 
     #[test]

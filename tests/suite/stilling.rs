@@ -17,7 +17,7 @@ use upright_design::rig::{LinkEncoder, Rig, Tolerances};
 use upright_design::simulate::Scenario;
 use upright_design::study::Study;
 use upright_design::table::{Gains, TableValues};
-use upright_plan::{Stilled, Tumbling, quantile_s, stilled};
+use upright_plan::{Stilled, Stored, Tumbling, designed_table, motions, quantile_s, recovered, stilled};
 use upright_test_support::repository;
 
 /// A rig of `rigs/`, whose file knows the dry friction of a typical cart, if it has a force.
@@ -175,4 +175,51 @@ fn a_rig_without_stilling_says_why_and_refuses_the_command() {
     };
     with_firmware(&without, asks).unwrap();
     assert!(matches!(answer, Some(Answer::NotNow(inhibits)) if inhibits.contains(Inhibits::NO_STILLING)));
+}
+
+/// A rig of `rigs/` with its stored motions, whose motor stills the links for so long after a fall (s).
+fn with_motions(name: &str, stilling_s: f64) -> (Rig, TableValues) {
+    let path = repository().join(format!("rigs/{name}.toml"));
+    let rig = Rig::from_path(&path).unwrap();
+    let motions = motions(&rig, &Stored::beside(&path).unwrap()).unwrap();
+    let mut table = designed_table(&rig, &motions).unwrap();
+    table.stilling.as_mut().unwrap().after_fall_ticks = (stilling_s / rig.tick.period_s) as u32;
+    (rig, table)
+}
+
+#[test]
+fn a_rig_that_falls_is_stilled_and_raised_again() {
+    for (name, runs) in [
+        ("single-quanser-ip02", 8),
+        ("double-quanser-dbpen", 6),
+        ("triple-glueck-eder-kugi", 4),
+        ("quadruple-paper", 4),
+        ("double-stepper", 4),
+    ] {
+        let (rig, table) = with_motions(name, 20.0);
+        let all = recovered(&rig, &table, (1, runs), &Study::whole()).unwrap();
+        assert!(all.iter().all(|run| run.fall.is_some() && run.upright_s.is_some()), "{name}: {all:?}");
+    }
+}
+
+#[test]
+fn a_motor_that_may_not_still_the_links_goes_off_after_a_fall() {
+    let (rig, table) = with_motions("single-quanser-ip02", 0.0);
+    for run in recovered(&rig, &table, (1, 3), &Study::whole()).unwrap() {
+        assert!(run.fall.is_some() && run.still_s.is_none() && run.upright_s.is_none(), "{run:?}");
+    }
+}
+
+#[test]
+fn the_rig_file_says_for_how_long_the_links_are_stilled_after_a_fall() {
+    let text = std::fs::read_to_string(repository().join("rigs/single-quanser-ip02.toml")).unwrap();
+    let ticks = |limits: &str| {
+        let text = text.replace("\n[limits]\n", &format!("\n[limits]\n{limits}\n"));
+        table(&Rig::from_toml(&text, Path::new("rig")).unwrap()).stilling.unwrap().after_fall_ticks
+    };
+    assert_eq!([ticks(""), ticks("stilling_s = 3")], [0, 1500]);
+    assert!(
+        Rig::from_toml(&text.replace("\n[limits]\n", "\n[limits]\nstilling_s = 61\n"), Path::new("rig"))
+            .is_err()
+    );
 }

@@ -10,6 +10,7 @@ use upright_design::rig::{Rig, key_table};
 
 use crate::failure::Failure;
 use crate::output::{print, warn_of_unusual_values};
+use crate::stilling::stilling;
 
 /// Reads a rig file and prints all its values, with defaults filled in.
 ///
@@ -55,6 +56,6 @@ impl CheckCommand {
         };
         let rig = Rig::from_path(&file)?;
         warn_of_unusual_values(&rig, &file);
-        print(self.json, &rig, || rig.describe() + &turning_limit(&rig))
+        print(self.json, &rig, || rig.describe() + &turning_limit(&rig) + &stilling(&rig))
     }
 }

@@ -14,11 +14,13 @@ mod failure;
 mod output;
 pub mod progress;
 pub mod project;
+mod stilling;
 
 pub use check::CheckCommand;
 pub use design::{AddMotions, DesignCommand};
 pub use failure::{Failure, exit_status};
 pub use output::{print, warn_of_an_arm, warn_of_unusual_values};
+pub use stilling::stilling;
 
 use clap::{Arg, Command};
 

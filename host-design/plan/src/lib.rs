@@ -21,6 +21,7 @@
 //! | `advice`, `remedy` | what would help if there is no motion |
 //! | `demonstration` | all of it in one run of the firmware |
 //! | `supervision` | the supervisor's limits in motion |
+//! | `stilling`, `recovery` | runs of the firmware that stills tumbling links, and raises a rig that was felled |
 //! | `in_table` | the table of the firmware |
 //! | `margins`, `trade` | pushes that a motion survives; duration, force and robustness of candidates |
 //! | `check`, `stored` | independent check; the file beside the rig file |
@@ -44,6 +45,7 @@ mod interior_point;
 mod margins;
 mod plan;
 mod problem;
+mod recovery;
 mod refine;
 mod remedy;
 mod riccati;
@@ -66,9 +68,10 @@ pub use firmware_runs::{Condition, FirmwareRuns, firmware_runs};
 pub use in_table::{designed_table, designed_table_with, with_motions};
 pub use margins::{Margin, margins};
 pub use plan::{MotionJudgement, SwingUpPlan, judge, motions, refined, search};
+pub use recovery::{Recovered, recovered};
 pub use robustness::{MotionSpread, RandomRuns};
 pub use route::{Route, RouteRuns, TransitionRuns, on_route, route_runs};
-pub use stilling::{Stilled, Tumbling, quantile_s, stilled};
+pub use stilling::{Stilled, StillingRuns, Tumbling, quantile_s, stilled};
 pub use stored::Stored;
 pub use trade::{SolvedCandidate, solved};
 pub use transitions::{Searched, StoredTransitions};

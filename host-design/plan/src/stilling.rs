@@ -1,6 +1,7 @@
 //! Random runs of the whole firmware that stills tumbling links.
 
 use core::f64::consts::PI;
+use core::fmt;
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -225,4 +226,61 @@ pub fn quantile_s(runs: &[Stilled], share: f64) -> f64 {
     times.sort_by(f64::total_cmp);
     let index = (share * times.len() as f64).ceil().max(1.0) as usize - 1;
     times.get(index).copied().unwrap_or(f64::INFINITY)
+}
+
+/// What the runs say about a rig.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StillingRuns {
+    /// Runs made.
+    pub runs: usize,
+    /// Runs in which the links hung still in the end, without a fault.
+    pub still: usize,
+    /// Runs in which the base has touched an end of the rail.
+    pub at_end: usize,
+    /// Time until half and 95 % of all runs were still (s); infinite if fewer were.
+    pub within_s: [f64; 2],
+    /// Energy returned to the supply that 95 % of the runs do not exceed (J).
+    pub returned_j: f64,
+    /// Capacitor that takes it before the supply counts as too high (F); none without a known supply.
+    pub capacitor_f: Option<f64>,
+}
+
+impl StillingRuns {
+    /// Sums up `all`, which are runs of `rig` with `table`.
+    pub fn of(table: &TableValues, all: &[Stilled]) -> Self {
+        let count = |what: &dyn Fn(&&Stilled) -> bool| all.iter().filter(what).count();
+        let mut returned: Vec<f64> = all.iter().map(|run| run.returned_j).collect();
+        returned.sort_by(f64::total_cmp);
+        let returned_j = returned.get(returned.len() * 95 / 100).copied().unwrap_or_default();
+        // ½ C (V_max² - V²) = E
+        let capacitor = |supply_v: f32| {
+            let [supply_v, max_v] = [supply_v, table.drive.supply_max_v()].map(f64::from);
+            2.0 * returned_j / (max_v * max_v - supply_v * supply_v)
+        };
+        Self {
+            runs: all.len(),
+            still: count(&|run| run.time_s.is_finite()),
+            at_end: count(&|run| run.is_at_end),
+            within_s: [0.5, 0.95].map(|share| quantile_s(all, share)),
+            returned_j,
+            capacitor_f: table.drive.supply_v().map(capacitor),
+        }
+    }
+}
+
+impl fmt::Display for StillingRuns {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [half_s, most_s] = self.within_s;
+        let Self { runs, still, at_end, returned_j, .. } = self;
+        writeln!(
+            f,
+            "  runs that are still   {still} of {runs}; half of them after {half_s:.1} s, 95 % after {most_s:.1} s"
+        )?;
+        writeln!(f, "  runs at an end stop   {at_end}")?;
+        write!(f, "  returned to supply    {returned_j:.2} J in 95 %")?;
+        match self.capacitor_f {
+            Some(capacitor_f) => writeln!(f, ": a capacitor of {:.1} mF, or a chopper", 1e3 * capacitor_f),
+            None => writeln!(f),
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use upright::table::{Law, PerLaw};
-use upright_design::design::{Certified, DesignPoles, Laws, Poles};
+use upright_design::design::{Certified, DesignPoles, Laws, Poles, Stilling};
 use upright_design::numerics::Matrix;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
@@ -19,6 +19,8 @@ pub(super) struct DesignData<'a> {
     continuous: LawsData<'a>,
     sampled: SampledData<'a>,
     table: Option<&'a TableValues>,
+    /// The law with which the motor stills the links; null if it cannot.
+    stilling: Option<Stilling>,
     /// The two precisions (bits) at which all values agreed.
     certified_bits: [usize; 2],
 }
@@ -105,6 +107,7 @@ impl<'a> DesignData<'a> {
                 }),
             },
             table,
+            stilling: Stilling::of(rig).ok(),
             certified_bits: certified.bits,
         }
     }

@@ -10,6 +10,7 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::{LawValues, TableValues};
 
 use super::law_report::LawReport;
+use crate::stilling::stilling;
 
 pub(super) fn design(rig: &Rig, certified: &Certified, poles: &DesignPoles, reports: &[LawReport]) -> String {
     let mut out = String::new();
@@ -71,7 +72,7 @@ fn write_design(
             None => writeln!(out, "  no closed loop: this design makes no table")?,
         }
     }
-    Ok(())
+    write!(out, "{}", stilling(rig))
 }
 
 fn write_law(

@@ -1,8 +1,11 @@
 //! The law with which the motor stills links that tumble: its gains, and what its energy certifies.
 
+use core::fmt;
+
 use serde::Serialize;
 use upright::table::Equilibrium;
 
+use crate::number::significant;
 use crate::numerics::{Matrix, eigenvalues};
 use crate::plant::{ChainParameters, linearise};
 use crate::rig::{CartInput, Chain, Rig};
@@ -11,7 +14,7 @@ use crate::rig::{CartInput, Chain, Rig};
 const SHARES: [f64; 2] = [0.6, 0.4];
 /// Mass of the base that the motor imitates, as a share of the base's own. A lighter one stills sooner, but the force
 /// that takes the rest away is as wrong as the base's stated mass.
-const OF_BASE: f64 = 0.18;
+const OF_BASE: f64 = 0.15;
 /// The same as a share of the links' mass, for a drive that imposes the base's acceleration: the base has no mass.
 const OF_LINKS: f64 = 0.3;
 /// A lighter base is imitated if the swings then decay by this factor faster.
@@ -74,9 +77,9 @@ pub struct Stilling {
     pub speed_m_per_s: f64,
     /// Energy of links that stand upright, above that of links that hang (J).
     pub upright_j: f64,
-    /// Distance from the middle that the base cannot exceed with this energy, and with twice of it (m); none where the
-    /// spring alone does not stop it.
-    pub excursion_m: [Option<f64>; 2],
+    /// Distance from the middle that the base cannot exceed with this energy, and with twice of it (m), if the rail is so
+    /// long: near its end, the base is braked besides.
+    pub excursion_m: [f64; 2],
     /// Links and imitated base, for the table.
     #[serde(skip)]
     pub(crate) imitated: Option<ChainParameters<f64>>,
@@ -150,17 +153,32 @@ impl Stilling {
     }
 }
 
+impl fmt::Display for Stilling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = |value: f64| significant(value, 3);
+        let [spring_n, damper_n] = self.most_n.map(short);
+        writeln!(f, "stilling")?;
+        writeln!(f, "  spring                {} N/m, at most {spring_n} N", short(self.stiffness))?;
+        writeln!(f, "  damper                {} N s/m, at most {damper_n} N", short(self.damping))?;
+        let base = self.imitated_kg.map_or_else(|| "as it is".to_owned(), |kg| format!("{} kg", short(kg)));
+        writeln!(f, "  imitated mass of cart {base}")?;
+        writeln!(f, "  dry friction made up  {} N", short(self.friction_n))?;
+        writeln!(f, "  slowest swing decays  {} 1/s", short(self.decay_per_s))?;
+        let [once, twice] = self.excursion_m.map(short);
+        writeln!(f, "  cart goes no further  {once} m from upright, {twice} m from twice that energy")
+    }
+}
+
 /// Where a spring of this stiffness (N/m) and largest force (N) has taken an energy (J): the largest distance from the
 /// middle (m) of a base that begins there.
-fn excursion_m(energy_j: f64, stiffness: f64, most_n: f64) -> Option<f64> {
+fn excursion_m(energy_j: f64, stiffness: f64, most_n: f64) -> f64 {
     let linear_m = most_n / stiffness;
     let linear_j = 0.5 * most_n * linear_m;
-    let reached_m = if energy_j <= linear_j {
+    if energy_j <= linear_j {
         (2.0 * energy_j / stiffness).sqrt()
     } else {
         linear_m + (energy_j - linear_j) / most_n
-    };
-    reached_m.is_finite().then_some(reached_m)
+    }
 }
 
 /// The chain on a base that is free to move, with this mass of base and links together (kg) and this viscous friction

@@ -298,7 +298,7 @@ impl Surroundings {
     fn wish(&self, status: &Status) -> Wish {
         match (self.how, status.signs) {
             (Holding::Free, _) => Wish::Free,
-            _ if status.state == State::Jogging => Wish::Free,
+            _ if matches!(status.state, State::Jogging | State::Stilling) => Wish::Free,
             (Holding::Guided, Signs::Move(sensor)) => Wish::Turn(sensor),
             (Holding::Guided, _) => Wish::Hang,
             (Holding::Hanging, _) => Wish::PushTo(0.0),

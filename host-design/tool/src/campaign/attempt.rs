@@ -380,6 +380,7 @@ impl Participant for BalancedRun<'_> {
         let is_on = run.is_on(&world.session, output);
         self.observed.output(tick, *output, is_on, run.ticks_since_stop(&world.session));
         self.fault = world.session.fault();
+        self.observed.stills |= world.session.status().state == State::Stilling;
         if self.observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
             self.observed.fault = self.fault;
         }

@@ -12,8 +12,10 @@ pub(super) struct Observed {
     pub(super) outputs: Vec<Output>,
     /// First tick in which the motor was off.
     pub(super) off: Option<usize>,
-    /// Whether it came on again afterwards.
+    /// Whether it came on again afterwards …
     pub(super) on_again: bool,
+    /// … to still the links after a fall, as the table allows.
+    pub(super) stills: bool,
     /// First tick in which the defect was visible: the rig differed from a healthy one by more than a threshold.
     pub(super) visible: Option<usize>,
     /// Whether a link or the cart was far beyond its limit while the motor was on.

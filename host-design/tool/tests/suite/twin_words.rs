@@ -47,6 +47,14 @@ fn the_guide_says_that_a_wish_has_lapsed_that_a_link_does_not_hang_and_that_a_he
     assert_eq!([&wish[0]["name"], &wish[0]["lapsed"]], [&json!("up"), &Value::Null]);
     assert_eq!([&wish[1]["name"], &wish[1]["lapsed"]], [&Value::Null, &json!("up")]);
 
+    // A motor that can still the links needs no hand.
+    let stills = guided(&mut browser, &json!({ "has_stilling": true }), &swings, &none, &none);
+    assert_eq!([&stills["act"]["text"], &stills["act"]["asks"][0]["line"]], ["Still and raise", "still"]);
+    assert_eq!(guided(&mut browser, &none, &swings, &none, &none)["act"]["text"], "Raise when still");
+    let stilling =
+        guided(&mut browser, &none, &json!({ "state": "Stilling" }), &none, &json!({ "name": "up" }));
+    assert!(text(&stilling, "below").contains("then raises them"), "{stilling}");
+
     // Before a person pulls, and while they do.
     let balancing = json!({ "state": "Balancing" });
     let many = json!({ "falls_when_held": true });

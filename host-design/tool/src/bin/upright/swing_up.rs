@@ -6,14 +6,16 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;
+use upright_design::design::Stilling;
 use upright_design::motion::Transition;
 use upright_design::rig::Rig;
 use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
 use upright_plan::{
-    Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, Stored, SwingUpError,
-    SwingUpPlan, designed_table, firmware_runs, judge, margins, motions, refined, search, solved,
+    Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, StillingRuns, Stored,
+    SwingUpError, SwingUpPlan, Tumbling, designed_table, firmware_runs, judge, margins, motions, refined,
+    search, solved, stilled,
 };
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
 use upright_tool::in_the_loop::RunError;
@@ -180,8 +182,10 @@ impl SwingUpCommand {
         if !self.check && !self.no_write && differs {
             write_atomically(&file, plan.stored.to_json().as_bytes())?;
         }
-        let object = json!({ "rig": rig.name, "raise": plan.raise, "lower": plan.lower });
-        print(self.json, &object, || text(&rig, &plan))?;
+        let stilling = stilling(&rig, &plan.table).map_err(failed)?;
+        let object =
+            json!({ "rig": rig.name, "raise": plan.raise, "lower": plan.lower, "stilling": stilling });
+        print(self.json, &object, || text(&rig, &plan) + &stilling_text(&stilling))?;
         if self.check && differs {
             return Err(Failure::check(format!("{} differs from these motions", file.display())));
         }
@@ -205,6 +209,21 @@ impl SwingUpCommand {
         }
         Ok(())
     }
+}
+
+/// Energy of the links in the runs of stilling, as a multiple of that of upright ones, and the number of runs.
+const TUMBLING: Tumbling = Tumbling { energies: 1.0, has_dry_friction: false };
+const STILLED: u64 = 40;
+
+/// The law with which the motor stills the links, and runs of it; none if it cannot.
+fn stilling(rig: &Rig, table: &TableValues) -> Result<Option<(Stilling, StillingRuns)>, SwingUpError> {
+    let Ok(law) = Stilling::of(rig) else { return Ok(None) };
+    let runs = stilled(rig, table, TUMBLING, (1, STILLED), &Study::whole())?;
+    Ok(Some((law, StillingRuns::of(table, &runs))))
+}
+
+fn stilling_text(stilling: &Option<(Stilling, StillingRuns)>) -> String {
+    stilling.as_ref().map_or_else(String::new, |(law, runs)| format!("\n{law}{runs}"))
 }
 
 /// Margins of both motions of `table`, with a progress bar.

@@ -207,7 +207,7 @@ export class Controls {
 
   telemetry(latest, wanted) {
     write(byId('inputs'), latest.inputs);
-    const isOn = ['Jogging', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering'].includes(latest.state);
+    const isOn = ['Jogging', 'Identifying', 'Armed', 'Raising', 'Balancing', 'Lowering', 'Stilling'].includes(latest.state);
     const against = isOn ? [] : latest.against_arming;
     const shown = [...byId('against').children].map((element) => element.textContent);
     if (shown.join() !== against.join()) {

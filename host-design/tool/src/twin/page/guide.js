@@ -18,7 +18,7 @@ const reason = (text) => plain(capital(text.replace(/^a link is not upright: /, 
 
 // Whether the firmware estimates the state, whether the motor may push, and whether it knows the positions.
 export const isEstimated = ({ state }) => ['Raising', 'Balancing', 'Holding', 'Lowering'].includes(state);
-export const isOn = (told) => isEstimated(told) || ['Jogging', 'Identifying'].includes(told.state);
+export const isOn = (told) => isEstimated(told) || ['Jogging', 'Identifying', 'Stilling'].includes(told.state);
 export const isHomed = ({ state, against_arming: against }) => (
   state !== 'Disarmed' && state !== 'Homing' && !begins(against, 'positions are not known'));
 
@@ -65,12 +65,13 @@ export class Witness {
 
   see(picture, latest) {
     const { machine: told } = picture;
-    if (latest.state !== 'Fault') this.fall = null;
+    const isLost = latest.state === 'Fault' || (latest.state === 'Stilling' && picture.fault !== null);
+    if (!isLost) this.fall = null;
     else if (this.fall === null) {
       const strongest = this.pulls.reduce((best, pull) => (pull.n > (best?.n ?? 0.02) ? pull : best), null);
       this.fall = { pull: strongest, defect: told?.defect ?? null, state: told?.state ?? latest.estimate };
     }
-    if (told?.t_s === undefined || latest.state === 'Fault') return;
+    if (told?.t_s === undefined || isLost) return;
     const isNew = this.pulls.length > 0 && told.t_s < this.pulls.at(-1).t;
     this.pulls = isNew ? [] : this.pulls.filter(({ t }) => t > told.t_s - RECENT_S);
     if (told.pull !== null) this.pulls.push({ t: told.t_s, n: Math.hypot(...told.pull.force_n), body: told.pull.body });
@@ -81,6 +82,7 @@ export const newtons = (n) => `${n.toFixed(n < 1 ? 2 : 1)} N`;
 export const bodyName = (body) => (body === 0 ? 'the cart' : `link ${body}`);
 
 const raise = { text: 'Raise', key: 'w', wish: 'up' };
+const stillAndRaise = { ...raise, text: 'Still and raise', asks: [say('still')] };
 const lift = (hello) => (hello.is_simulated ? { text: 'Lift by hand', key: 'u', wish: 'arm' }
   : { text: 'Arm', key: 'a', asks: [say('arm')] });
 
@@ -115,10 +117,10 @@ function calibrated({ hello, latest, machine: told, wish }) {
   const line = hangs ? 'Hanging, motor off' : 'Motor off, not hanging yet';
   if (wish.lapsed === 'up' && isSwinging) {
     const remedy = hello.is_simulated ? 'Let the hand hold it still, then raise it' : 'Hold it still with your hand, then raise it';
-    return { step: 3, line, below: `Not raised: after ${LAPSES_MS / 1e3} s it still swings. ${remedy}.`, act: still ?? { ...raise, text: 'Raise when still' } };
+    return { step: 3, line, below: `Not raised: after ${LAPSES_MS / 1e3} s it still swings. ${remedy}.`, act: still ?? (hello.has_stilling ? stillAndRaise : { ...raise, text: 'Raise when still' }) };
   }
   return { step: 3, line, below: isSwinging ? 'It still swings: links of little friction do so for minutes.' : `${reason(swing[0])}.`,
-    act: { ...raise, text: isSwinging ? 'Raise when still' : 'Raise when possible' } };
+    act: isSwinging && hello.has_stilling ? stillAndRaise : { ...raise, text: isSwinging ? 'Raise when still' : 'Raise when possible' } };
 }
 
 function balancing({ hello, machine: told }) {
@@ -134,15 +136,24 @@ function balancing({ hello, machine: told }) {
     act: hello.has_swing_up ? { text: 'Lower', key: 's', asks: [say('down')] } : undefined };
 }
 
+const faultName = (fault) => (fault === null ? 'a fault' : fault.name + (fault.at === null ? '' : ` (${fault.at})`));
+
 function fallen({ hello, picture, fall, step }) {
   const { fault } = picture;
-  const name = fault === null ? 'a fault' : fault.name + (fault.at === null ? '' : ` (${fault.at})`);
+  const name = faultName(fault);
   const line = fall?.defect ? `Broken on purpose: the firmware turned the motor off: ${name}`
     : fall?.pull ? `It fell: a pull of ${newtons(fall.pull.n)} was too strong` : `The motor is off: ${name}`;
   const below = hello.is_simulated ? 'One click puts everything back (in a simulation only).' : capital(fault?.remedy ?? '');
   const act = hello.is_simulated ? { text: 'Put it back up', key: 'b', asks: [machine({ do: 'restart', upright: true })] }
     : { text: 'Clear the fault', key: 'c', asks: [say('clear')] };
   return { step, line, below, act, isLost: true };
+}
+
+function stilling({ hello, picture, fall, wish }) {
+  const fell = fall?.pull ? `It fell: a pull of ${newtons(fall.pull.n)} was too strong` : `It fell: ${faultName(picture.fault)}`;
+  return { step: 3, line: picture.fault === null ? 'The motor stills the links' : fell,
+    below: `The motor brings the links to rest${wish.name === 'up' ? ', then raises them. Stop cancels it.' : ': hands off.'}`,
+    act: hello.has_swing_up && wish.name !== 'up' ? { ...raise, text: 'Then raise' } : undefined };
 }
 
 const BY_STATE = {
@@ -157,6 +168,7 @@ const BY_STATE = {
   Raising: () => ({ step: 3, line: 'The motor swings it up', below: 'Hands off until it stands.' }),
   Balancing: balancing,
   Holding: () => ({ step: 4, line: 'Holding where some links hang', act: { ...raise, asks: [say('up')], wish: undefined } }),
+  Stilling: stilling,
   Lowering: () => ({ step: 4, line: 'The motor lowers it', below: 'Hands off until it hangs.' }),
   Fault: fallen,
 };
