@@ -120,7 +120,8 @@ impl<const N: usize> Receiver<N> {
         if self.completes_frame(byte) { Some(self.decoded()) } else { None }
     }
 
-    /// Takes the next byte. Whether it completes a frame, which is to be [`decoded`](Self::decoded) before the next byte.
+    /// Takes the next byte. Whether it completes a frame, which is to be [`decoded`](Self::decoded) before the next
+    /// byte.
     pub fn completes_frame(&mut self, byte: u8) -> bool {
         if byte == DELIMITER {
             return self.length > 0;

@@ -18,7 +18,8 @@ const DOCUMENT: &str = include_str!("../../docs/own-board.md");
 
 /// File for the profiles of this repository.
 const PROFILES: &str = "profiles.toml";
-/// Upright's crates that the host program needs: they are compiled again, because they belong to another workspace here.
+/// Upright's crates that the host program needs: they are compiled again, because they belong to another workspace
+/// here.
 const COMPILED_AGAIN: [&str; 2] = ["upright-design", "upright-closed-loop"];
 
 /// The files in the document: a line with the name and a colon, an empty line, and a block.

@@ -101,7 +101,7 @@ fn still(
         answer => return Err(HarnessError::Refused { request: Request::Still, answer }),
     }
     world.let_go();
-    let mut watch = Watch::of(rig);
+    let mut watch = StillingWatch::of(rig);
     world.run((LONGEST_S / rig.tick.period_s) as usize, &mut [&mut RailEnds::of(rig), &mut watch])?;
     Ok(watch.seen)
 }
@@ -159,7 +159,7 @@ fn set_in_motion(
 }
 
 /// Watches the rig until the firmware has ended its stilling.
-struct Watch<'a> {
+struct StillingWatch<'a> {
     rig: &'a Rig,
     seen: Stilled,
     returned_j: f64,
@@ -167,7 +167,7 @@ struct Watch<'a> {
     driven: (Option<f64>, f64),
 }
 
-impl<'a> Watch<'a> {
+impl<'a> StillingWatch<'a> {
     fn of(rig: &'a Rig) -> Self {
         let seen = Stilled {
             time_s: f64::INFINITY,
@@ -189,7 +189,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-impl Participant for Watch<'_> {
+impl Participant for StillingWatch<'_> {
     fn act(&mut self, world: &mut World<'_>, output: &mut Output) -> Flow {
         let duty = if let Drive::Duty(duty) = output.drive { Some(duty.into()) } else { None };
         self.driven = (duty, world.bench.state()[1]);
