@@ -79,8 +79,9 @@ pub(crate) fn differences(from: &str, toml: &str) -> Result<Vec<Value>, PageRefu
         .collect())
 }
 
-/// The sliders that a person finds first: what each changes, and the keys that change with it. Each key has its value and
-/// the power of the slider's relative change by which it is multiplied; without a power, it has the slider's own value.
+/// The sliders that a person finds first: what each changes, and the keys that change with it. Each key has its value
+/// and the power of the slider's relative change by which it is multiplied; without a power, it has the slider's own
+/// value.
 pub(crate) fn dials(rig: &Rig, text: &RigText) -> Vec<Value> {
     let PlantDescription::Chain(chain) = &rig.plant else { return Vec::new() };
     let mut scales: [Vec<Value>; 2] = Default::default();

@@ -77,8 +77,8 @@ pub struct Stilling {
     pub speed_m_per_s: f64,
     /// Energy of links that stand upright, above that of links that hang (J).
     pub upright_j: f64,
-    /// Distance from the middle that the base cannot exceed with this energy, and with twice of it (m), if the rail is so
-    /// long: near its end, the base is braked besides.
+    /// Distance from the middle that the base cannot exceed with this energy, and with twice of it (m), if the rail is
+    /// so long: near its end, the base is braked besides.
     pub excursion_m: [f64; 2],
     /// Links and imitated base, for the table.
     #[serde(skip)]

@@ -243,7 +243,7 @@ fn replace_words(text: &str, from: &str, to: &str) -> String {
     let [first, last] = [from.starts_with(is_part), from.ends_with(is_part)];
     while let Some(start) = rest.find(from) {
         let (before, after) = (&rest[..start], &rest[start + from.len()..]);
-        let is_word = !(first && before.ends_with(is_part)) && !(last && after.starts_with(is_part));
+        let is_word = !(first && before.ends_with(is_part) || last && after.starts_with(is_part));
         replaced.push_str(before);
         replaced.push_str(if is_word { to } else { from });
         rest = after;

@@ -19,7 +19,7 @@ use crate::number::significant;
 
 /// The smallest and the largest value that a rig on a bench has, by key, and that of an arm in its own unit. A key that
 /// may be 0 has 0 as its smallest.
-const USUAL: &[(&str, [f64; 2], Option<[f64; 2]>)] = &[
+const USUAL: &[Usual] = &[
     ("tick.period_s", [2e-5, 0.1], None),
     ("cart.mass_kg", [0.01, 100.0], Some([1e-6, 10.0])),
     ("cart.friction_n_s_per_m", [0.0, 200.0], Some([0.0, 5.0])),
@@ -47,6 +47,9 @@ const USUAL: &[(&str, [f64; 2], Option<[f64; 2]>)] = &[
     ("limits.speed_m_per_s", [0.02, 50.0], Some([0.1, 500.0])),
     ("limits.jog_force_n", [5e-3, 500.0], Some([1e-4, 100.0])),
 ];
+
+/// Key, values of a cart, and those of an arm if they differ.
+type Usual = (&'static str, [f64; 2], Option<[f64; 2]>);
 
 /// What is usual for the speed of a cart whose motor has no load (m/s), and of an arm (rad/s).
 const FREE_SPEED: [[f64; 2]; 2] = [[0.05, 50.0], [0.5, 2e3]];

@@ -28,8 +28,8 @@ const VIEWER: u64 = 1;
 #[derive(Debug, Deserialize)]
 #[serde(tag = "twin", rename_all = "kebab-case")]
 enum TwinQuestion {
-    /// Switches the power of another rig on, raised or hanging. `since_1970_s` is the time (s); `own` are a person's own
-    /// gains K.
+    /// Switches the power of another rig on, raised or hanging. `since_1970_s` is the time (s); `own` are a person's
+    /// own gains K.
     Start { toml: String, motions: Option<String>, own: Option<Vec<f64>>, upright: bool, since_1970_s: f64 },
     /// What the person asks for, then the ticks that are due after `passed_s` of real time, but at most `most_ticks`.
     /// A person who `is_silent` for too long is no longer in command.

@@ -68,8 +68,8 @@ impl WithLinks for Accelerations<'_> {
         let state = WideChainState {
             x: positions[0],
             xdot: speeds[0],
-            phi: summed(positions).into(),
-            phidot: summed(speeds).into(),
+            phi: summed(positions),
+            phidot: summed(speeds),
         };
         let friction = &rig.reality.friction;
         let input = match &rig.actuator {

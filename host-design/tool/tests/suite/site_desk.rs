@@ -258,8 +258,13 @@ fn a_slider_designs_the_rig_again_lets_the_new_one_stand_and_says_what_changed()
     designed(&mut browser, &read("single-quanser-ip02"));
     until(&mut browser, "upright.desk.survival");
     assert_eq!(browser.value("upright.desk.survival"), before);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
 
-    // What differs from the example, one value taken back; and two loops side by side.
+#[test]
+fn what_differs_from_the_example_is_listed_and_two_loops_stand_side_by_side() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    until(&mut browser, "upright.desk.survival");
     click(&mut browser, "#keep");
     dial(&mut browser, "weight", 1.0);
     until(&mut browser, "document.querySelectorAll('#differences tr').length === 2");
@@ -281,8 +286,13 @@ fn a_slider_designs_the_rig_again_lets_the_new_one_stand_and_says_what_changed()
     assert!(comes_within(&mut browser, 10.0, "document.querySelectorAll('#together polyline').length === 2"));
     click(&mut browser, "#forget");
     assert_eq!(browser.value("document.getElementById('compared').hidden"), true);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
 
-    // A link more, another drive and other sensors, by their pictures; and what cannot be, beside them.
+#[test]
+fn links_drive_and_sensors_are_chosen_by_their_pictures() {
+    let Some((mut browser, _folder)) = opened() else { return };
+    until(&mut browser, "upright.desk.survival");
     let [links, drive, sensors] = [1, 2, 3];
     let choose = |browser: &mut Browser, group: usize, number: usize| {
         click(browser, &format!("#pictures .choice:nth-of-type({group}) button:nth-child({number})"));
