@@ -188,7 +188,10 @@ mod tests {
         let way_m = speed * speed / (2.0 * gains.braking_m_per_s2);
         let start = |before_m: f32| counts(high - way_m - before_m) - 40 * moved;
         assert_eq!(input(start(-0.02), moved, &gains), Ok(-20.0));
-        assert!(input(start(0.05), moved, &gains).unwrap() > -20.0);
+        // A little further away, a weak spring and a weak damper are left alone.
+        let weak = StillingGains { stiffness: 1.0, damping: 0.1, imitated: None, ..gains };
+        assert_eq!(input(start(-0.02), moved, &weak), Ok(-20.0));
+        assert!(input(start(0.05), moved, &weak).unwrap() > -20.0);
         // It is not braked on its way back.
         let inward =
             input(-start(-0.02) - 80 * moved, moved, &StillingGains { imitated: None, ..gains }).unwrap();
