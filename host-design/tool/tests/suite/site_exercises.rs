@@ -25,7 +25,13 @@ fn answer(browser: &mut Browser, answer: &str, said: &str) {
 
 /// Opens the exercise of this number.
 fn begin(browser: &mut Browser, number: usize) {
-    click(browser, &format!("#lesson-list > button:nth-child({number})"));
+    let button = format!("#lesson-list > button:nth-child({number})");
+    click(browser, &button);
+    let is_open = format!(
+        "((title) => title !== '' && document.querySelector('{button}').textContent.includes(title))\
+         (document.getElementById('lesson-title').textContent)"
+    );
+    until(browser, &is_open);
     until(browser, "!document.getElementById('balance').disabled && upright.desk.design.states === 4");
 }
 

@@ -84,7 +84,8 @@ class Comparison {
   // The rig is about to change: changes that follow at once belong together.
   changes() {
     const at = performance.now();
-    if (at - this.changedAt > 2 * ONE_STEP_MS && this.now !== null) this.before = this.now;
+    const isNew = this.before === null || at - this.changedAt > 2 * ONE_STEP_MS;
+    if (isNew && this.now !== null) this.before = this.now;
     this.changedAt = at;
   }
 
