@@ -36,9 +36,7 @@ mod app {
     use upright::protocol::serial_link::SerialLink;
     use upright::table::{Fill, GainTable, TransitionTable};
 
-    use crate::board::{
-        CLOCK_HZ, Hardware, SerialLine, TICK_US, UsbMemory, set_up, start_ticks, tables,
-    };
+    use crate::board::{CLOCK_HZ, Hardware, SerialLine, TICK_US, UsbMemory, set_up, start_ticks, tables};
 
     #[shared]
     struct Shared {}
