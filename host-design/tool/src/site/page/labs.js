@@ -71,7 +71,7 @@ class Labs {
   async open(lab) {
     const example = examples.find(({ name }) => name === lab.rig);
     if (example === undefined) return notice(`The lab needs the rig ${lab.rig}, which this page does not have.`, {}, true);
-    const { toml, failed } = await this.ask({ ask: 'vary', toml: example.toml, vary: lab.vary, seed: this.kept.seed });
+    const { toml, failed } = await this.ask({ ask: 'vary', toml: example.toml, vary: lab.vary ?? [], seed: this.kept.seed });
     if (failed !== undefined) return notice(failed.why, {}, true);
     Object.assign(this, { lab, rig: toml });
     const first = lab.step.findIndex((_, number) => !this.stepOf(lab, number).is_right);
