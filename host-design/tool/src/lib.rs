@@ -18,8 +18,6 @@
 //! | [`twin`] | the live twin: a page on which the rig moves |
 //! | [`site`] | the whole of it in a page, with nothing to install |
 //! | [`marking`] | a class's labs, run again |
-//! | [`progress`] | what a long computation tells meanwhile |
-//! | [`project`] | finds the checkout that images are built from |
 //!
 //! ```
 //! use upright_tool::figure::{Curve, Figure, Axis, Panel};
