@@ -82,7 +82,6 @@ pub use nalgebra;
 
 #[cfg(feature = "firmware")]
 pub mod board;
-#[cfg(feature = "firmware")]
 pub mod boards;
 pub mod control;
 #[cfg(feature = "firmware")]
