@@ -40,16 +40,16 @@ pub(crate) fn tables() -> ImageTables<'static> {
     ImageTables::at(flash(code_end(), FLASH_END), NAME, [STATES, SENSORS])
 }
 
-/// The image in flash: code and tables.
+/// The image in flash: code and tables. Where it ends is read from the tables.
 pub(super) fn words() -> &'static [u32] {
     flash(FLASH, code_end() + size_of_val(tables().words))
 }
 
-/// The checksum of the image as it is now.
-pub(super) fn of_image() -> WordSums {
+/// The checksum of an image.
+pub(super) fn of_image(image: &[u32]) -> WordSums {
     let mut sums = WordSums::default();
-    add(&mut sums, words().get(..REFERENCE.start).unwrap_or_default());
-    add(&mut sums, words().get(REFERENCE.end..).unwrap_or_default());
+    add(&mut sums, image.get(..REFERENCE.start).unwrap_or_default());
+    add(&mut sums, image.get(REFERENCE.end..).unwrap_or_default());
     sums
 }
 
@@ -62,7 +62,8 @@ fn add(sums: &mut WordSums, words: &[u32]) {
 /// Checks the gain table in RAM and the image in flash again and again.
 pub(crate) struct MemoryCheck {
     tables: [&'static GainTable<STATES, SENSORS>; 2],
-    /// Sums of the image at the start.
+    /// The image, and its sums at the start.
+    image: &'static [u32],
     reference: WordSums,
     /// Ticks from one check to the next, and words of the image that it reads.
     ticks_per_check: u32,
@@ -76,16 +77,21 @@ pub(crate) struct MemoryCheck {
 
 impl MemoryCheck {
     /// The check of a table and its copy, and of the image as it is now.
-    pub(super) fn new(tables: [&'static GainTable<STATES, SENSORS>; 2], tick_s: f32) -> Self {
+    pub(super) fn new(
+        tables: [&'static GainTable<STATES, SENSORS>; 2],
+        image: &'static [u32],
+        tick_s: f32,
+    ) -> Self {
         let mut reference = WordSums::default();
-        add(&mut reference, words());
+        add(&mut reference, image);
         let ticks_per_check = ((CHECK_S / tick_s) as u32).max(1);
         let checks_per_pass = ((PASS_S / (ticks_per_check as f32 * tick_s)) as usize).max(1);
         Self {
             tables,
+            image,
             reference,
             ticks_per_check,
-            words_per_check: words().len().div_ceil(checks_per_pass),
+            words_per_check: image.len().div_ceil(checks_per_pass),
             wait: ticks_per_check,
             read: 0,
             sums: WordSums::default(),
@@ -109,7 +115,7 @@ impl MemoryCheck {
                 }
             }
         }
-        let rest = words().get(self.read..).unwrap_or_default();
+        let rest = self.image.get(self.read..).unwrap_or_default();
         let part = rest.get(..self.words_per_check).unwrap_or(rest);
         add(&mut self.sums, part);
         self.read += part.len();

@@ -93,8 +93,9 @@ pub(crate) fn set_up(
     // Clears flags that were set while the pull-ups charged the inputs.
     let _ = (motor.was_stopped(), pins::driver_fault_was_reported(&device.EXTI));
     // In this order: what changes in between is found by the check.
-    let memory = MemoryCheck::new(tables, tick_s);
-    let image = memory::of_image();
+    let image = memory::words();
+    let memory = MemoryCheck::new(tables, image, tick_s);
+    let sums = memory::of_image(image);
     let hardware = F4Hardware {
         motor,
         steps: core::array::from_fn(|_| Steps::new(tick_cycles)),
@@ -107,11 +108,11 @@ pub(crate) fn set_up(
         tick_s,
         clock_fault: clock == Clock::Fallback,
         wrong_chip,
-        image_is_damaged: image != WordSums::carried_by(memory::words()),
+        image_is_damaged: sums != WordSums::carried_by(image),
         overrun: false,
         limits: [false; 2],
     };
-    (hardware, line, memory, Start { reset, crash, image: image.weighted })
+    (hardware, line, memory, Start { reset, crash, image: sums.weighted })
 }
 
 impl F4Hardware {
