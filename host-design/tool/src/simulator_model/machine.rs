@@ -23,6 +23,17 @@ pub enum NoModel {
     NoCartMass,
 }
 
+/// Keys of `[reality]` that every format has: those of the chain and of its joints.
+const CARRIED: [&str; 7] = [
+    "joint_friction_n_m",
+    "cart_mass_percent",
+    "link_mass_percent",
+    "link_length_percent",
+    "link_inertia_percent",
+    "parameter_spread_percent",
+    "parameter_seed",
+];
+
 /// The simulated machine's chain.
 pub(super) fn machine(rig: &Rig) -> Result<Chain, NoModel> {
     let chain = rig.chain().ok_or(NoModel::NoBodies)?;
@@ -38,8 +49,8 @@ pub(super) fn inertia_kg_m2(link: &Link) -> f64 {
 }
 
 /// Lines of an XML comment: each sensor's step, noise and age, the tick, and the keys of `[reality]` that are not among
-/// those `carried`.
-pub(super) fn facts(rig: &Rig, carried: &[&str]) -> String {
+/// those that every format has, or `further` ones that this format has.
+pub(super) fn facts(rig: &Rig, further: &[&str]) -> String {
     let period_s = rig.tick.period_s;
     let begins = if rig.tick.delay_ticks == 0 { "in its tick" } else { "one tick later" };
     let mut lines = format!("  A tick is {period_s} s, and its input begins {begins}.\n");
@@ -54,7 +65,8 @@ pub(super) fn facts(rig: &Rig, carried: &[&str]) -> String {
             sensor.noise
         );
     }
-    let left: Vec<&str> = rig.reality.given_keys().filter(|key| !carried.contains(key)).collect();
+    let left: Vec<&str> =
+        rig.reality.given_keys().filter(|key| !CARRIED.contains(key) && !further.contains(key)).collect();
     if !left.is_empty() {
         lines += &format!("  Not in this file, of [reality]: {}.\n", left.join(", "));
     }

@@ -15,18 +15,8 @@ const IMMOVABLE: f64 = 1e10;
 /// Tolerance of MuJoCo's solver, which it takes as a share of the mean mass.
 const TOLERANCE: f64 = 1e-8;
 
-/// Keys of `[reality]` that the file has.
-const CARRIED: &[&str] = &[
-    "joint_friction_n_m",
-    "force_percent",
-    "driver_lag_s",
-    "cart_mass_percent",
-    "link_mass_percent",
-    "link_length_percent",
-    "link_inertia_percent",
-    "parameter_spread_percent",
-    "parameter_seed",
-];
+/// Keys of `[reality]` that the file has beside those of the chain.
+const CARRIED: &[&str] = &["force_percent", "driver_lag_s"];
 /// Further ones, where a force moves the cart.
 const CARRIED_WITH_FORCE: &[&str] = &["cart_friction_n", "current_limit_a"];
 

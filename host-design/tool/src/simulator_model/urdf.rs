@@ -6,17 +6,8 @@ use upright_design::rig::Rig;
 
 use super::machine::{NoModel, TIP, UNLIMITED, facts, inertia_kg_m2, machine, plain};
 
-/// Keys of `[reality]` that the file has.
-const CARRIED: &[&str] = &[
-    "joint_friction_n_m",
-    "cart_friction_n",
-    "cart_mass_percent",
-    "link_mass_percent",
-    "link_length_percent",
-    "link_inertia_percent",
-    "parameter_spread_percent",
-    "parameter_seed",
-];
+/// The key of `[reality]` that the file has beside those of the chain.
+const CARRIED: &[&str] = &["cart_friction_n"];
 
 /// The bodies and joints of `rig` as a URDF. It has no motor, sensors and gravity; a comment names their numbers.
 ///
