@@ -188,53 +188,77 @@ impl Base {
 
     /// Its position.
     pub fn position(self) -> Quantity {
-        match self {
-            Self::Cart => Quantity { name: "position", unit: "m" },
-            Self::Arm => Quantity { name: "arm angle", unit: "rad" },
-        }
+        self.quantities().position
     }
 
     /// Its speed.
     pub fn speed(self) -> Quantity {
-        match self {
-            Self::Cart => Quantity { name: "speed", unit: "m/s" },
-            Self::Arm => Quantity { name: "arm speed", unit: "rad/s" },
-        }
+        self.quantities().speed
     }
 
     /// What a motor does to it.
     pub fn force(self) -> Quantity {
-        match self {
-            Self::Cart => Quantity { name: "force", unit: "N" },
-            Self::Arm => Quantity { name: "torque", unit: "N·m" },
-        }
+        self.quantities().force
     }
 
     /// Its acceleration.
     pub fn acceleration(self) -> Quantity {
-        let unit = if self.is_cart() { "m/s²" } else { "rad/s²" };
-        Quantity { name: "acceleration", unit }
+        self.quantities().acceleration
     }
 
     /// What resists its acceleration.
     pub fn mass(self) -> Quantity {
-        match self {
-            Self::Cart => Quantity { name: "mass", unit: "kg" },
-            Self::Arm => Quantity { name: "inertia", unit: "kg·m²" },
-        }
+        self.quantities().mass
     }
 
     /// What resists its speed.
     pub fn damping(self) -> Quantity {
-        let unit = if self.is_cart() { "N·s/m" } else { "N·m·s/rad" };
-        Quantity { name: "viscous friction", unit }
+        self.quantities().damping
     }
 
     /// What it is called.
     pub fn noun(self) -> &'static str {
-        if self.is_cart() { "cart" } else { "arm" }
+        self.quantities().noun
+    }
+
+    fn quantities(self) -> &'static Quantities {
+        match self {
+            Self::Cart => &OF_CART,
+            Self::Arm => &OF_ARM,
+        }
     }
 }
+
+/// A base's name and its quantities.
+struct Quantities {
+    noun: &'static str,
+    position: Quantity,
+    speed: Quantity,
+    acceleration: Quantity,
+    force: Quantity,
+    mass: Quantity,
+    damping: Quantity,
+}
+
+static OF_CART: Quantities = Quantities {
+    noun: "cart",
+    position: Quantity { name: "position", unit: "m" },
+    speed: Quantity { name: "speed", unit: "m/s" },
+    acceleration: Quantity { name: "acceleration", unit: "m/s²" },
+    force: Quantity { name: "force", unit: "N" },
+    mass: Quantity { name: "mass", unit: "kg" },
+    damping: Quantity { name: "viscous friction", unit: "N·s/m" },
+};
+
+static OF_ARM: Quantities = Quantities {
+    noun: "arm",
+    position: Quantity { name: "arm angle", unit: "rad" },
+    speed: Quantity { name: "arm speed", unit: "rad/s" },
+    acceleration: Quantity { name: "acceleration", unit: "rad/s²" },
+    force: Quantity { name: "torque", unit: "N·m" },
+    mass: Quantity { name: "inertia", unit: "kg·m²" },
+    damping: Quantity { name: "viscous friction", unit: "N·m·s/rad" },
+};
 
 /// `text` with `to` in the places where `from` stands as a word of its own.
 fn replace_words(text: &str, from: &str, to: &str) -> String {
