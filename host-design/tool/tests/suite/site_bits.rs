@@ -10,17 +10,14 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use upright_page::{Desk, TICKS};
 use upright_test_support::limits::{PATIENCE, output};
-use upright_tool::site::module;
+use upright_tool::site::{Example, examples, module};
 
 use crate::equipment::{is_required, not_exercised};
-use crate::site_page::{opened, until as until_designed};
+use crate::site_page::{opened, root, until as until_designed};
 use crate::twin_page::comes_within;
 
 /// Rigs that the firmware does not run on the host: a model with ten states, of which only the table is compared.
 const NO_FIRMWARE: [&str; 1] = ["quadruple-paper-printed"];
-
-/// Name of a rig that is no example of the page.
-const LATE: &str = "late";
 
 /// All rigs of the project, and one whose force and readings are late: name, text, stored motions.
 fn rigs() -> Vec<(String, String, Option<String>)> {
@@ -33,7 +30,7 @@ fn rigs() -> Vec<(String, String, Option<String>)> {
     let published = files
         .iter()
         .map(|file| (name(file), read(file).unwrap(), read(&file.with_extension("swing-up.json"))));
-    published.chain([(LATE.to_owned(), late_rig(), None)]).collect()
+    published.chain([("late".to_owned(), late_rig(), None)]).collect()
 }
 
 /// The text of a rig whose force begins a tick late and lags, and whose sensor is slow.
@@ -149,7 +146,7 @@ fn tables_and_runs_of_all_rigs_have_the_same_bits_in_the_page() {
     compared.assert_same(browser.value("found").as_array().unwrap());
 
     // Each example is shown, with its run.
-    for (name, ..) in compared.rigs.iter().filter(|(name, ..)| name != LATE) {
+    for Example { name, .. } in examples(&root().join("rigs")).unwrap() {
         browser.value(&format!(
             "{{ const example = document.getElementById('example'); example.value = '{name}'; \
              document.getElementById('verdict').textContent = ''; example.dispatchEvent(new Event('change')); }}"

@@ -187,6 +187,11 @@ fn after_a_wrong_input_nothing_is_called_good_and_the_reason_is_in_sight() {
     type_in(&mut browser, &heavy);
     until(&mut browser, "document.getElementById('unusual').textContent.includes('link[1].mass_kg')");
     until(&mut browser, &format!("{VERDICT}.textContent !== '' && {VERDICT}.className !== 'good'"));
+    // A file that is not typed to its end.
+    let (lawless, _) = heavy.split_once("[lqr]").unwrap();
+    type_in(&mut browser, lawless);
+    until(&mut browser, &format!("{VERDICT}.textContent.includes('asks for no control law')"));
+    click(&mut browser, "#keep");
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 

@@ -229,7 +229,7 @@ function showLoop() {
 // What is kept of the loop as it is now, to be compared with another one.
 function snapshot() {
   const law = chosen();
-  return { name: `${desk.sketch.rig}, ${desk.own === null ? law.title : 'your K'}`, lengths: desk.sketch.lengths_m, travel: desk.sketch.travel_m, rows: law.run?.rows ?? null,
+  return { name: `${desk.sketch.rig}, ${desk.own === null ? law?.title ?? 'no law' : 'your K'}`, lengths: desk.sketch.lengths_m, travel: desk.sketch.travel_m, rows: law?.run?.rows ?? null,
     abilities: abilities({ survival: desk.survival ?? {}, law }) };
 }
 
