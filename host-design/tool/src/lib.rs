@@ -42,6 +42,7 @@ pub mod in_the_loop;
 pub mod markdown;
 pub mod marking;
 pub mod monitor;
+mod packed;
 mod policy;
 pub mod report;
 pub mod simulator_model;

@@ -15,7 +15,9 @@ use super::compiler::{Compiler, compiler_for_chips, target_directory};
 use super::error::{BuildError, TARGET};
 use super::kept;
 use super::limits::check_table;
+use super::prebuilt::Prebuilt;
 use super::tables::with_tables;
+use super::ticks::ClassTicks;
 use super::uf2::uf2;
 use super::usual;
 use upright_command::project::checkout;
@@ -30,6 +32,8 @@ pub struct BuiltImage {
     pub elf: PathBuf,
     /// For the drive that a board shows whose boot loader has one.
     pub uf2: Option<PathBuf>,
+    /// Ticks of the rigs that share its code.
+    pub ticks: ClassTicks,
 }
 
 impl BuiltImage {
@@ -46,18 +50,64 @@ impl BuiltImage {
 /// [`BuildError`] if the board cannot serve the rig, there is no compiler, or it fails.
 pub fn build_for(board: &'static BoardRow, rig: &Rig, table: &TableValues) -> Result<BuiltImage, BuildError> {
     check_table(board, table)?;
-    let code = compile(board, table)?;
+    let path = compile(board, table)?;
+    let code = read(&path)?;
+    with_code(board, rig, table, (&path, &code, &ClassTicks::kept(&path, &code)))
+}
+
+impl Prebuilt {
+    /// Builds the image with the tables of `rig` without a compiler; `None` if there is no code for rigs like it.
+    ///
+    /// # Errors
+    /// [`BuildError`] if the board cannot serve the rig, or the image cannot be written.
+    pub fn build_for(
+        &self,
+        board: &'static BoardRow,
+        rig: &Rig,
+        table: &TableValues,
+    ) -> Result<Option<BuiltImage>, BuildError> {
+        check_table(board, table)?;
+        let code = self.code(&class_name(board, table));
+        code.map(|code| with_code(board, rig, table, code)).transpose()
+    }
+
+    /// Compiles the code for rigs like that of `table`, and takes it in, with the longest tick that is known now.
+    ///
+    /// # Errors
+    /// As for [`build_for`].
+    pub fn take_in(&mut self, board: &'static BoardRow, table: &TableValues) -> Result<(), BuildError> {
+        check_table(board, table)?;
+        let path = compile(board, table)?;
+        let code = read(&path)?;
+        Ok(self.add(&class_name(board, table), &path, &code, &ClassTicks::kept(&path, &code))?)
+    }
+}
+
+/// The image with the tables of `rig` behind this code: where it was read from, its bytes and its ticks.
+fn with_code(
+    board: &'static BoardRow,
+    rig: &Rig,
+    table: &TableValues,
+    (path, code, ticks): (&Path, &[u8], &ClassTicks),
+) -> Result<BuiltImage, BuildError> {
     let mut name = format!("{board}-{:016x}-{:08x}", rig.hash(), table.crc());
     if let Some(crc) = table.swing_up_crc() {
         name += &format!("-{crc:08x}");
     }
     let elf = images()?.join(format!("{name}.elf"));
-    let bytes = with_tables(&code, &read(&code)?, &image_tables(board, table))?;
-    write_atomically(&elf, &with_reference(&elf, bytes)?)?;
-    let Family::Rp(rp) = &board.family else { return Ok(BuiltImage { elf, uf2: None }) };
+    let bytes = with_reference(&elf, with_tables(path, code, &image_tables(board, table))?)?;
+    write_atomically(&elf, &bytes)?;
+    let ticks = ticks.clone();
+    let Family::Rp(rp) = &board.family else { return Ok(BuiltImage { elf, uf2: None, ticks }) };
     let path = elf.with_extension("uf2");
-    write_atomically(&path, &uf2(rp.chip.uf2_family(), &elf, &read(&elf)?)?)?;
-    Ok(BuiltImage { elf, uf2: Some(path) })
+    write_atomically(&path, &uf2(rp.chip.uf2_family(), &elf, &bytes)?)?;
+    Ok(BuiltImage { elf, uf2: Some(path), ticks })
+}
+
+/// Name of the code for rigs like that of `table`.
+fn class_name(board: &BoardRow, table: &TableValues) -> String {
+    let crc = crc32(0, class_source(table).as_bytes());
+    format!("{board}-{}x{}-{crc:08x}", table.states(), table.sensors())
 }
 
 /// How long it usually takes here to build an image of this board that is not there already.
@@ -123,7 +173,7 @@ fn compile(board: &'static BoardRow, table: &TableValues) -> Result<PathBuf, Bui
     let root = checkout()?;
     let _others_wait = one_at_a_time()?;
     let source = class_source(table);
-    let name = format!("{board}-{}x{}-{:08x}", table.states(), table.sensors(), crc32(0, source.as_bytes()));
+    let name = class_name(board, table);
     let (gains, elf) = (images()?.join(format!("{name}.rs")), images()?.join(format!("{name}.elf")));
     // An unchanged file stays as it is, so that nothing is compiled again.
     if std::fs::read_to_string(&gains).ok().as_ref() != Some(&source) {
@@ -172,9 +222,11 @@ fn one_at_a_time() -> Result<File, BuildError> {
     locked.map_err(|source| BuildError::File { path, source })
 }
 
-/// Directory in which images are kept; it is created if it does not exist.
+/// Directory in which images are kept; it is created if it does not exist. Without a checkout, it is in the current
+/// folder.
 fn images() -> Result<PathBuf, BuildError> {
-    let directory = target_directory()?.join("images");
+    let directory =
+        target_directory().map_or_else(|_| PathBuf::from("upright-images"), |target| target.join("images"));
     match std::fs::create_dir_all(&directory) {
         Ok(()) => Ok(directory),
         Err(source) => Err(BuildError::File { path: directory, source }),

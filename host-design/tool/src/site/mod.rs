@@ -15,7 +15,6 @@ mod files;
 mod labs;
 mod module;
 mod motions;
-mod packed;
 mod page;
 mod twin;
 

@@ -6,9 +6,9 @@ use upright::protocol::BAUD;
 use upright_page::{Desk, Lab};
 
 use super::motions::without_knots;
-use super::packed::packed;
 use super::twin::{TwinPage, bare, shared};
 use crate::figure::{COLOURS_CSS, page_theme, style_sheet};
+use crate::packed::packed;
 use crate::policy::{base64, source};
 
 const PAGE: &str = include_str!("page/desk.html");

@@ -1,17 +1,21 @@
 //! What a tick of the flashed image costs, on the virtual board.
 
+use std::collections::BTreeMap;
+
 use upright::boards::DEFAULT_BOARD;
 use upright::table::Law;
 use upright_board::{Conditions, CoreTiming, Image, Rules, SimulatedBoard};
 use upright_design::rig::Rig;
 use upright_design::simulate::Scenario;
-use upright_design::table::TableValues;
-use upright_tool::image::compiler;
+use upright_design::table::{TableValues, class_source};
+use upright_test_support::repository;
+use upright_tool::image::{SPREAD, compiler};
 use upright_tool::in_the_loop::{Span, TickCycles, measure};
+use upright_trust::verify::at_rest_disturbed;
 
-use crate::equipment::built;
+use crate::equipment::{built, built_for};
 use crate::powered::sealed;
-use crate::published::rig_and_table;
+use crate::published::{rig_and_table, rig_and_table_with_motions, rig_of, rig_path, table};
 
 /// Goals for the median of balancing: from the tick to the output, the whole task and the jitter of the output (µs).
 const GOAL_LATENCY_US: f64 = 8.0;
@@ -148,4 +152,75 @@ fn by_the_slow_model_the_image_misses_the_goals_of_task_and_controller_and_no_ot
     // No more than a tenth above what that page says.
     let (controller, task) = (cycles.typical.unwrap().controller.cycles, cycles.typical.unwrap().whole.us);
     assert!(controller < 1130 && task < 17.0, "{controller} {task}");
+}
+
+/// The longest tick of the image for a rig (µs), as `firmware build` measures it; `None` without a compiler, and for a
+/// rig that never balances.
+fn longest_us(rig: &Rig, table: &TableValues, turns: Option<u8>) -> Option<f64> {
+    let elf = built_for(DEFAULT_BOARD, rig, table)?;
+    let image = Image::from_elf(&std::fs::read(elf).unwrap()).unwrap();
+    let image = turns.map_or_else(|| image.clone(), |turns| slower(&image, turns));
+    let (law, _) = table.laws.present().next().unwrap();
+    let scenario = Scenario { duration_s: 0.5, ..at_rest_disturbed(rig, law, 1) };
+    let cycles = measure(rig, table, &scenario, &image, &Conditions::f405(1)).unwrap();
+    assert_eq!(cycles.check(), Ok(()), "{}", rig.name);
+    assert_eq!(cycles.ended.is_some(), table.observer.is_none(), "{}: {:?}", rig.name, cycles.ended);
+    println!("{:40} {:7.2} µs of {:8.1} µs", rig.name, cycles.all.whole.us, cycles.period.us);
+    table.observer.as_ref().map(|_| cycles.all.whole.us)
+}
+
+/// The rigs in `rigs/`, with the motions that are stored there, and rigs with what makes the tick of the first one
+/// longer.
+fn many_rigs() -> Vec<(Rig, TableValues)> {
+    let files = std::fs::read_dir(repository().join("rigs")).unwrap().map(|file| file.unwrap().path());
+    let names = files.filter(|path| path.extension().is_some_and(|end| end == "toml"));
+    let mut rigs: Vec<_> = names
+        .map(|path| {
+            let name: &'static str = path.file_stem().unwrap().to_str().unwrap().to_owned().leak();
+            let has_motions = path.with_extension("swing-up.json").exists();
+            if has_motions { rig_and_table_with_motions(name).clone() } else { rig_and_table(name).clone() }
+        })
+        .collect();
+    let file = std::fs::read_to_string(rig_path("single-quanser-ip02")).unwrap();
+    let is_of_motor = |line: &&str| {
+        ["torque_c", "resistance", "gear", "pulley", "supply", "dead"].iter().any(|key| line.starts_with(key))
+    };
+    let without_motor: String =
+        file.lines().filter(|line| !is_of_motor(line)).map(|line| format!("{line}\n")).collect();
+    let friction = "\n[friction]\njoint_n_m = 1e-5\ncart_n = 0.1\n";
+    for (text, friction, period_s) in [
+        (&file, "", "0.002"),
+        (&file, friction, "0.002"),
+        (&without_motor, friction, "0.002"),
+        (&without_motor, friction, "0.005"),
+        (&file, "", "0.001"),
+    ] {
+        let text = text.replace("period_s = 0.002", &format!("period_s = {period_s}"));
+        let rig = rig_of(&(text + friction));
+        rigs.push((rig.clone(), table(&rig)));
+    }
+    rigs
+}
+
+#[test]
+#[ignore = "measures the ticks of every rig: minutes"]
+fn ticks_of_all_rigs_with_the_same_code_are_within_the_spread_that_is_assumed() {
+    let mut classes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let is_beyond = |longest: &[f64]| {
+        let [least, most] = [f64::min, f64::max].map(|of| longest.iter().copied().reduce(of).unwrap());
+        println!("{} rigs share code: at most {:.3} times the shortest", longest.len(), most / least);
+        most > SPREAD * least
+    };
+    for (rig, table) in many_rigs() {
+        let Some(us) = longest_us(&rig, &table, None) else { continue };
+        classes.entry(class_source(&table)).or_default().push(us);
+    }
+    let (single, table) = rig_and_table("single-quanser-ip02");
+    let same = classes.get_mut(&class_source(table)).unwrap();
+    assert!(same.len() >= 6, "{same:?}");
+    same.iter().for_each(|us| assert!((20.0..40.0).contains(us), "{us}"));
+    // Negative control: a rig whose ticks are 10 µs longer.
+    let longer = longest_us(single, table, Some(4)).unwrap();
+    assert!(is_beyond(&[same.as_slice(), &[longer]].concat()));
+    classes.values().for_each(|longest| assert!(!is_beyond(longest), "{longest:?}"));
 }

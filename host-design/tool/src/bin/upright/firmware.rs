@@ -8,6 +8,7 @@ mod cycles;
 mod drive;
 mod flash;
 mod monitor;
+mod prebuild;
 mod run;
 mod size;
 
@@ -28,6 +29,7 @@ pub(crate) struct FirmwareCommand {
 enum FirmwareSubcommand {
     Boards(boards::BoardsCommand),
     Build(build::BuildCommand),
+    Prebuild(prebuild::PrebuildCommand),
     Cycles(Box<cycles::CyclesCommand>),
     Size(size::SizeCommand),
     Flash(flash::FlashCommand),
@@ -40,6 +42,7 @@ impl FirmwareCommand {
         match self.command {
             FirmwareSubcommand::Boards(command) => command.run(),
             FirmwareSubcommand::Build(command) => command.run(),
+            FirmwareSubcommand::Prebuild(command) => command.run(),
             FirmwareSubcommand::Cycles(command) => command.run(),
             FirmwareSubcommand::Size(command) => command.run(),
             FirmwareSubcommand::Flash(command) => command.run(),

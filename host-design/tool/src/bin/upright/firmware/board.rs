@@ -10,7 +10,8 @@ pub(super) struct BoardOption {
     pub(super) board: &'static BoardRow,
 }
 
-fn board(name: &str) -> Result<&'static BoardRow, String> {
+/// Parses the name of a board.
+pub(super) fn board(name: &str) -> Result<&'static BoardRow, String> {
     let names = || BOARDS.iter().map(|board| board.name).collect::<Vec<_>>().join(", ");
     named(name).ok_or_else(|| format!("no board has this name; choose one of {}", names()))
 }

@@ -6,16 +6,17 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::board::BoardOption;
-use super::built::built;
+use super::built::{Code, built};
 use super::cycles::check_ticks;
 use crate::variation::Wanted;
 use upright_command::Failure;
 
-/// Builds the image of a board, runs it on the virtual board, and prints the path of its ELF file; exit status 1 if a
-/// tick takes longer than a quarter of its period. For a Pico or Pico 2, it prints the path of the UF2 file, beside
-/// which the ELF file is, and does not run it.
+/// Builds the image of a board, and prints the path of its ELF file; exit status 1 if a tick takes longer than a
+/// quarter of its period. For a Pico or Pico 2, it prints the path of the UF2 file, beside which the ELF file is.
 ///
-/// Uses the compiler of rustup if its target thumbv7em-none-eabihf is installed, otherwise that of Debian. If there is
+/// Writes the tables of the rig into an image of upright-images.lzma, which lies beside the tool or is named by the
+/// environment variable UPRIGHT_IMAGES. Without that file, or for a rig of another kind, it compiles the image, with
+/// the compiler of rustup if its target thumbv7em-none-eabihf is installed, otherwise that of Debian. If there is
 /// neither, the exit status is 4, and the message says what to install.
 #[derive(Args)]
 #[command(before_help = "\
@@ -35,13 +36,17 @@ pub(crate) struct BuildCommand {
     /// Leave the stored motions out
     #[arg(long, requires = "rig", conflicts_with = "transitions")]
     no_motions: bool,
+    /// Compile the image, even if it is there already, as it is beside the tool of a release
+    #[arg(long)]
+    from_source: bool,
 }
 
 impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
-        let built = built(self.on.board, self.rig.as_deref(), wanted)?;
-        check_ticks(self.on.board, &built)?;
+        let mut built =
+            built(self.on.board, self.rig.as_deref(), wanted, Code::from_option(self.from_source))?;
+        check_ticks(self.on.board, &mut built)?;
         writeln!(std::io::stdout(), "{}", built.image.flashed().display())?;
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use upright::boards::BoardRow;
 use upright_design::rig::Rig;
 use upright_design::table::{Gains, TableValues};
-use upright_tool::image::{self, BuildError, BuiltImage, CommittedGains};
+use upright_tool::image::{self, BuildError, BuiltImage, CommittedGains, Prebuilt};
 
 use crate::building::building;
 use crate::variation::{Wanted, with_stored_motions, with_table};
@@ -18,12 +18,42 @@ pub(super) struct ForRig {
     pub(super) table: TableValues,
 }
 
+/// The code of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Code {
+    /// Prebuilt, if the tool has it for this board and rigs like this one, otherwise compiled.
+    Prebuilt,
+    /// Compiled from the sources.
+    Compiled,
+}
+
+impl Code {
+    /// What the option `--from-source` asks for.
+    pub(super) fn from_option(from_source: bool) -> Self {
+        if from_source { Self::Compiled } else { Self::Prebuilt }
+    }
+}
+
 /// Builds the image with the table of the rig and its stored motions, or with src/gains.rs, which has none.
-pub(super) fn built(board: &'static BoardRow, rig: Option<&Path>, wanted: Wanted) -> Result<ForRig, Failure> {
+pub(super) fn built(
+    board: &'static BoardRow,
+    rig: Option<&Path>,
+    wanted: Wanted,
+    code: Code,
+) -> Result<ForRig, Failure> {
+    let prebuilt = if code == Code::Prebuilt { Prebuilt::find()? } else { None };
     let (rig, table) = match rig {
         Some(path) => designed_for(board, path, wanted)?,
         None => committed(board)?,
     };
+    if let Some(prebuilt) = prebuilt {
+        if let Some(image) = prebuilt.build_for(board, &rig, &table)? {
+            return Ok(ForRig { image, rig, table });
+        }
+        eprintln!(
+            "no image is prebuilt for {board} and the kinds of drive and sensors of this rig: compiling it"
+        );
+    }
     let image = building(board, || image::build_for(board, &rig, &table))?;
     Ok(ForRig { image, rig, table })
 }

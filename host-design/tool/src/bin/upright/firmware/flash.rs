@@ -7,7 +7,7 @@ use clap::Args;
 use upright::boards::Family;
 
 use super::board::BoardOption;
-use super::built::built;
+use super::built::{Code, built};
 use super::cycles::check_ticks;
 use super::drive::copy_to_drive;
 use crate::variation::Wanted;
@@ -35,13 +35,16 @@ pub(crate) struct FlashCommand {
     /// Leave the stored motions out
     #[arg(long, requires = "rig", conflicts_with = "transitions")]
     no_motions: bool,
+    /// Compile the image, even if it is there already, as it is beside the tool of a release
+    #[arg(long)]
+    from_source: bool,
 }
 
 impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
         let board = self.on.board;
-        let build = || built(board, self.rig.as_deref(), wanted);
+        let build = || built(board, self.rig.as_deref(), wanted, Code::from_option(self.from_source));
         match &board.family {
             Family::Rp(rp) => copy_to_drive(board, rp.chip.drive(), build()?.image.flashed()),
             Family::F4(f4) => {
@@ -51,8 +54,8 @@ impl FlashCommand {
                         "probe-rs is missing: install it (https://probe.rs, or `cargo install probe-rs-tools --locked`)",
                     ));
                 }
-                let built = build()?;
-                check_ticks(board, &built)?;
+                let mut built = build()?;
+                check_ticks(board, &mut built)?;
                 let chip = format!("{}{}", f4.chip.name(), f4.package);
                 probe_rs(&["download", "--verify", "--chip", &chip], Some(&built.image.elf))?;
                 probe_rs(&["reset", "--chip", &chip], None)
