@@ -7,8 +7,8 @@ const MOST_WORDS_OF_A_PAGE: usize = 2000;
 /// All of them together.
 const MOST_WORDS: usize = 22_000;
 
-/// The words of a page: a path, a link or a command has several, a name in `snake_case` is one. Tables and listings that
-/// a test compares with the code, between `<!-- name -->` and `<!-- /name -->`, are not counted.
+/// The words of a page: a path, a link or a command has several, a name in `snake_case` is one. Tables and listings
+/// that a test compares with the code, between `<!-- name -->` and `<!-- /name -->`, are not counted.
 fn words(page: &str) -> usize {
     let (before, rest) = page.split_once("<!-- ").unwrap_or((page, ""));
     let (name, rest) = rest.split_once(" -->").unwrap_or((rest, ""));
