@@ -40,7 +40,7 @@ mod tests {
 
     #[test]
     fn what_was_packed_comes_back_and_half_of_it_does_not() {
-        let bytes: Vec<u8> = (0..50_000_u32).map(|number| (number * number >> 7) as u8).collect();
+        let bytes: Vec<u8> = (0..50_000_u32).map(|number| ((number * number) >> 7) as u8).collect();
         let small = packed(&bytes);
         assert!(small.len() < bytes.len());
         assert_eq!(unpacked(&small).unwrap(), bytes);

@@ -17,7 +17,7 @@ use upright_design::table::TableValues;
 use upright_test_support::equipment::{is_required, not_exercised};
 use upright_test_support::limits::{Lines, Running};
 use upright_test_support::repository;
-use upright_tool::image::build_for;
+use upright_tool::image::{Prebuilt, build_for};
 
 /// The outputs of the chip after a tick, and what it has sent since the tick before.
 pub(super) struct Answer {
@@ -60,7 +60,7 @@ fn harness() -> PathBuf {
     repository().join("boards/rp2040/harness")
 }
 
-/// The image for this rig, if the compiler and the emulator are there.
+/// The image for this rig, if the compiler and the emulator are there, as a tool without a compiler writes it.
 pub(super) fn uf2_with_motions(rig: &Rig, table: &TableValues) -> Option<PathBuf> {
     let has_emulator = harness().join("node_modules/rp2040js").is_dir();
     assert!(has_emulator || !is_required("UPRIGHT_REQUIRE_PICO"), "run `npm ci` in boards/rp2040/harness");
@@ -69,7 +69,10 @@ pub(super) fn uf2_with_motions(rig: &Rig, table: &TableValues) -> Option<PathBuf
         return None;
     }
     let pico = named("pico").unwrap();
-    Some(if_possible(build_for(pico, rig, table), "the image for a Pico")?.uf2.unwrap())
+    let compiled = if_possible(build_for(pico, rig, table), "the image for a Pico")?;
+    let mut prebuilt = Prebuilt::none_by("of this test");
+    prebuilt.take_in(pico, table, &compiled.ticks).unwrap();
+    prebuilt.build_for(pico, rig, table).unwrap()?.uf2
 }
 
 impl Chip {

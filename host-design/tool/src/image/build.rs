@@ -71,15 +71,19 @@ impl Prebuilt {
         code.map(|code| with_code(board, rig, table, code)).transpose()
     }
 
-    /// Compiles the code for rigs like that of `table`, and takes it in, with the longest tick that is known now.
+    /// Compiles the code for rigs like that of `table`, and takes it in, with its ticks as far as they are known.
     ///
     /// # Errors
     /// As for [`build_for`].
-    pub fn take_in(&mut self, board: &'static BoardRow, table: &TableValues) -> Result<(), BuildError> {
+    pub fn take_in(
+        &mut self,
+        board: &'static BoardRow,
+        table: &TableValues,
+        ticks: &ClassTicks,
+    ) -> Result<(), BuildError> {
         check_table(board, table)?;
         let path = compile(board, table)?;
-        let code = read(&path)?;
-        Ok(self.add(&class_name(board, table), &path, &code, &ClassTicks::kept(&path, &code))?)
+        Ok(self.add(&class_name(board, table), &path, &read(&path)?, ticks)?)
     }
 }
 

@@ -9,7 +9,7 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_plan::up_and_down;
 use upright_test_support::limits::output;
-use upright_tool::image::{BuiltImage, PREBUILT_VARIABLE, Prebuilt, build_for};
+use upright_tool::image::{BuiltImage, PREBUILT_VARIABLE, Prebuilt, SPREAD, build_for};
 use upright_tool::in_the_loop::{VirtualBoard, run_compared};
 
 use crate::equipment::if_possible;
@@ -17,10 +17,12 @@ use crate::published::{rig_and_table, rig_and_table_with_motions, rig_path};
 
 /// A file with the images for a single pendulum, with motions, on these boards; `None` without a compiler.
 fn prebuilt(folder: &Path, boards: &[&'static BoardRow]) -> Option<Prebuilt> {
-    let (_, table) = rig_and_table_with_motions("single-quanser-ip02");
+    let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
     let mut images = Prebuilt::none_by("of this test");
     for board in boards {
-        if_possible(images.take_in(board, table), "prebuilt images")?;
+        let mut ticks = if_possible(build_for(board, rig, table), "prebuilt images")?.ticks;
+        ticks.keep(30.0);
+        images.take_in(board, table, &ticks).unwrap();
     }
     let path = folder.join("images.lzma");
     std::fs::write(&path, images.packed()).unwrap();
@@ -37,6 +39,7 @@ fn flashed(image: &BuiltImage) -> Vec<u8> {
 fn equal(prebuilt: &Prebuilt, board: &'static BoardRow, (rig, table): &(Rig, TableValues)) -> BuiltImage {
     let compiled = flashed(&build_for(board, rig, table).unwrap());
     let image = prebuilt.build_for(board, rig, table).unwrap().unwrap();
+    assert!(image.ticks.bound_us() >= Some(30.0 * SPREAD));
     assert!(compiled.len() > 20_000 && flashed(&image) == compiled, "{board} {}", rig.name);
     image
 }

@@ -62,7 +62,7 @@ fn take_in_kind(prebuilt: &mut Prebuilt, path: &Path, boards: &[&'static BoardRo
             let image = building(board, || image::build_for(board, &rig, &table))?;
             let mut built = ForRig { image, rig: rig.clone(), table: table.clone() };
             check_ticks(board, &mut built)?;
-            prebuilt.take_in(board, &table)?;
+            prebuilt.take_in(board, &table, &built.image.ticks)?;
         }
     }
     Ok(())
