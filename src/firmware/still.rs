@@ -73,6 +73,7 @@ impl<'t, const NX: usize, const NY: usize, S: SwingUp<NX, NY>> Firmware<'t, NX, 
             Ok(input) => {
                 let (drive, applied) = self.actuate(input, self.stiller.speed_m_per_s(), gains.speed_m_per_s);
                 (self.requested_n, self.applied_n) = (input, applied);
+                self.stiller.take_applied(applied);
                 self.output = Output::on(drive, &table.drive);
             }
             Err((fault, sensor)) => self.trip(fault, sensor),

@@ -104,6 +104,21 @@ impl<const N: usize, T: Number> ChainModel<N, T> {
         ChainState { x: state.xdot, xdot: (f + reaction) * inverse_mass, phi: state.phidot, phidot: phiddot }
     }
 
+    /// Momentum of base and links along the way of the base (kg m/s; of an arm, that about its axis, kg m²/s). Nothing
+    /// but a force on the base changes it: neither weight nor torques in the joints do.
+    pub fn momentum(&self, state: &ChainState<N, T>) -> T {
+        let zero = self.inverse_mass.constant(0.0);
+        let (sin, cos) = T::sines_and_cosines(&state.phi);
+        let [reacting] = &self.reaction.data.0;
+        let mut momentum = state.xdot / self.inverse_mass;
+        for k in 0..N {
+            momentum -= reacting[k] * cos[k] * state.phidot[k];
+        }
+        let turning =
+            self.turning.as_ref().map_or(zero, |turning| turning.at(&sin, &cos, &state.phidot).inertia);
+        momentum + turning * state.xdot
+    }
+
     /// Adds Q_j = τ_j - τ_{j+1}, friction included, to `r`: each joint torque acts on its own link and, with opposite
     /// sign, on the link below.
     #[inline(always)]
@@ -229,6 +244,18 @@ mod tests {
         // (b - a²/M) φ̈ = g a φ
         assert!((rate.phidot[0] / (5e-6 / (1.0 / 3.0 - 0.125)) - 1.0).abs() < 1e-9);
         assert_eq!((rate.x, rate.phi), (0.0, [0.0]));
+    }
+
+    #[test]
+    fn nothing_but_a_force_on_the_base_changes_the_momentum() {
+        let turning = Some(Turning { beta: matrix![1.0 / 3.0], reaction: 1.0 });
+        let state = ChainState { x: 0.1, xdot: 1.5, phi: [2.0], phidot: [-7.0] };
+        for model in [ChainModel { cart_friction: 0.4, ..ROD }, ChainModel { turning, ..ROD }] {
+            let rate = model.derivative(&state, 3.0, &[0.2]);
+            let after = |dt: f64| model.momentum(&state.plus(dt, &rate));
+            let change = (after(1e-5) - after(-1e-5)) / 2e-5;
+            assert!((change - (3.0 - model.cart_friction * state.xdot)).abs() < 1e-6, "{change}");
+        }
     }
 
     #[test]

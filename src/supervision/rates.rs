@@ -13,20 +13,28 @@ pub type Found = (Fault, Option<u8>);
 #[derive(Debug, Clone)]
 pub struct Rates<const NY: usize> {
     last: [i32; NY],
-    /// Rates (m/s, rad/s).
+    /// Whether the first difference is the rate, instead of 0 with a filter.
+    is_moving: bool,
+    /// Rates in the last tick, and filtered ones (m/s, rad/s).
+    latest: [f32; NY],
     rates: [f32; NY],
 }
 
 impl<const NY: usize> Default for Rates<NY> {
     fn default() -> Self {
-        Self { last: [0; NY], rates: [0.0; NY] }
+        Self::at_rest(&[0; NY])
     }
 }
 
 impl<const NY: usize> Rates<NY> {
     /// Begins with everything at rest at these counts.
     pub fn at_rest(counts: &[i32; NY]) -> Self {
-        Self { last: *counts, rates: [0.0; NY] }
+        Self { last: *counts, is_moving: false, latest: [0.0; NY], rates: [0.0; NY] }
+    }
+
+    /// Begins at these counts, with rates that are known after a tick.
+    pub fn moving(counts: &[i32; NY]) -> Self {
+        Self { is_moving: true, ..Self::at_rest(counts) }
     }
 
     /// Takes the counts of a tick of `tick_s` (s), in which the cart (m/s) and a joint (rad/s) move no faster than
@@ -42,16 +50,24 @@ impl<const NY: usize> Rates<NY> {
         tick_s: f32,
     ) -> Result<(), Found> {
         let before = core::mem::replace(&mut self.last, *counts);
-        let counts = counts.iter().zip(&before).zip(&mut self.rates);
-        for (sensor, (row, ((&count, &before), filtered))) in (0..).zip(sensors.iter().zip(counts)) {
+        let share = if core::mem::take(&mut self.is_moving) { 1.0 } else { (tick_s / FILTER_S).min(1.0) };
+        let counts = counts.iter().zip(&before).zip(self.latest.iter_mut().zip(&mut self.rates));
+        for (sensor, (row, ((&count, &before), (latest, filtered)))) in (0..).zip(sensors.iter().zip(counts))
+        {
             let rate = row.step * count.wrapping_sub(before) as f32 / tick_s;
             let most = if sensor == 0 { fastest[0] } else { fastest[1] };
             if f32::abs(rate) > most {
                 return Err((Fault::Encoder, Some(sensor)));
             }
-            *filtered += (rate - *filtered) * (tick_s / FILTER_S).min(1.0);
+            *latest = rate;
+            *filtered += (rate - *filtered) * share;
         }
         Ok(())
+    }
+
+    /// The rates in the last tick, as the counts say (m/s, rad/s).
+    pub fn latest(&self) -> &[f32; NY] {
+        &self.latest
     }
 
     /// The rates (m/s, rad/s).

@@ -11,13 +11,17 @@
 //! ```
 //!
 //! An outward bound base that would otherwise pass the soft end of the rail is braked with the largest force.
+//!
+//! A motor that is reversed, or that follows a sensor that is, adds energy instead. So the momentum of base and links
+//! along the rail is compared with the impulse of the motor: nothing else changes it but friction of the base, however
+//! the links tumble.
 
 use crate::control::spring_damper::SpringDamper;
 use crate::control::state_feedback::saturate;
 use crate::plant::ChainState;
 use crate::supervision::fault::Fault;
 use crate::supervision::rates::{Found, Rates};
-use crate::table::{GainTable, StillingGains};
+use crate::table::{GainTable, ImitatedBase, StillingGains};
 
 /// After a command, the motor goes off after this time, whether the links hang still or not (s).
 pub const LONGEST_S: f32 = 20.0;
@@ -28,29 +32,76 @@ const RATE_OF_SPEED: f32 = 2.0;
 const STICKS_M_PER_S: f32 = 0.02;
 /// That force, times this, is what is made up for, at most all of the known friction.
 const STUCK_GAIN: f32 = 5.0;
+/// Time over which they are compared (s).
+const COMPARED_S: f32 = 0.1;
+/// Change of momentum that no impulse explains, as a share of the impulse and of the momentum that base and links have
+/// if they move together with the energy of upright links: the masses are wrong, and the base has dry friction.
+const UNEXPLAINED: [f32; 2] = [0.5, 0.3];
+
+/// Momentum along the rail, compared with the impulse of the motor.
+#[derive(Debug, Clone, Default)]
+struct MomentumBalance {
+    /// Momentum a tick ago (N s); none before.
+    momentum: Option<f32>,
+    /// Change of the momentum that the force does not explain, and impulse without its sign (N s).
+    unexplained: f32,
+    impulse: f32,
+}
+
+impl MomentumBalance {
+    /// A tick with the rig in `state`, in which the motor has applied `force_n`. Returns whether they fit.
+    fn fits<const NY: usize>(
+        &mut self,
+        state: &ChainState<NY>,
+        base: &ImitatedBase<NY>,
+        force_n: f32,
+        tick_s: f32,
+    ) -> bool {
+        let [mass, friction] = base.taken;
+        let momentum = base.model.momentum(state) + mass * state.xdot;
+        let Some(before) = self.momentum.replace(momentum) else { return true };
+        let left = 1.0 - (tick_s / COMPARED_S).min(1.0);
+        let explained = (force_n - (friction + base.model.cart_friction) * state.xdot) * tick_s;
+        self.unexplained = left * self.unexplained + (momentum - before) - explained;
+        self.impulse = left * self.impulse + f32::abs(force_n) * tick_s;
+        let [of_impulse, of_upright] = UNEXPLAINED;
+        let excess = f32::abs(self.unexplained) - of_impulse * self.impulse;
+        let total_kg = 1.0 / base.model.inverse_mass + mass;
+        let upright_j = 2.0 * base.model.weight.sum();
+        excess <= 0.0 || excess * excess <= of_upright * of_upright * 2.0 * total_kg * upright_j
+    }
+}
 
 /// State of the stilling of a rig with `NY` sensors.
 #[derive(Debug, Clone)]
 pub struct Stiller<const NY: usize> {
     rates: Rates<NY>,
     ticks_left: u32,
+    balance: MomentumBalance,
+    /// Force of the last tick (N).
+    applied_n: f32,
 }
 
 impl<const NY: usize> Default for Stiller<NY> {
     fn default() -> Self {
-        Self { rates: Rates::default(), ticks_left: 0 }
+        Self { rates: Rates::default(), ticks_left: 0, balance: MomentumBalance::default(), applied_n: 0.0 }
     }
 }
 
 impl<const NY: usize> Stiller<NY> {
-    /// Begins with the sensors at these counts, for at most so many ticks. The rates are known after some milliseconds.
+    /// Begins with the sensors at these counts, for at most so many ticks. The rates are known a tick later.
     pub fn begin(&mut self, counts: &[i32; NY], longest_ticks: u32) {
-        *self = Self { rates: Rates::at_rest(counts), ticks_left: longest_ticks };
+        *self = Self { rates: Rates::moving(counts), ticks_left: longest_ticks, ..Self::default() };
     }
 
     /// Speed of the base (m/s), filtered.
     pub fn speed_m_per_s(&self) -> f32 {
         self.rates.speed_m_per_s()
+    }
+
+    /// Takes the force that the motor applies until the next tick (N).
+    pub fn take_applied(&mut self, applied_n: f32) {
+        self.applied_n = applied_n;
     }
 
     /// Whether the time is over.
@@ -82,12 +133,34 @@ impl<const NY: usize> Stiller<NY> {
         if f32::abs(state.xdot) > gains.speed_m_per_s {
             return Err((Fault::Speed, None));
         }
+        if let Some(base) = gains.imitated.as_ref().filter(|_| driven_m_per_s.is_none())
+            && !self.balance.fits(&self.in_last_tick(&state, table), base, self.applied_n, table.tick_s)
+        {
+            return Err((Fault::Motor, None));
+        }
         let most = table.drive.largest_input();
         if gains.has_to_brake(&state, table.limits.rail_m) {
             return Ok(f32::copysign(most, -state.xdot));
         }
         let input = gains.input(&state, table.drive.pulses().is_some());
         if input.is_finite() { Ok(input) } else { Err((Fault::NotFinite, None)) }
+    }
+
+    /// The state in the middle of the last tick, with the rates that the counts say: filtered ones are too late for
+    /// links that whip round.
+    fn in_last_tick<const NX: usize>(
+        &self,
+        now: &ChainState<NY>,
+        table: &GainTable<NX, NY>,
+    ) -> ChainState<NY> {
+        let mut state = ChainState { xdot: self.rates.latest().first().copied().unwrap_or_default(), ..*now };
+        let mut rate = 0.0;
+        let links = state.phi.iter_mut().zip(&mut state.phidot);
+        for (&joint_rate, (phi, phidot)) in self.rates.latest().iter().skip(1).zip(links) {
+            rate += joint_rate;
+            (*phi, *phidot) = (*phi - 0.5 * table.tick_s * rate, rate);
+        }
+        state
     }
 
     /// The state at these counts, with the angles of the links from the vertical up to whole turns.
@@ -138,6 +211,7 @@ impl<const NY: usize> StillingGains<NY> {
 mod tests {
     use super::*;
     use crate::gains::{SENSORS, TABLE};
+    use core::f32::consts::PI;
 
     /// Input in the first tick at these counts of the cart, in the second one of which it has moved by `moved`.
     fn input(cart: i32, moved: i32, gains: &StillingGains<SENSORS>) -> Result<f32, Found> {
@@ -196,6 +270,26 @@ mod tests {
         let inward =
             input(-start(-0.02) - 80 * moved, moved, &StillingGains { imitated: None, ..gains }).unwrap();
         assert!(inward > 0.0 && inward < 20.0, "{inward}");
+    }
+
+    /// Ticks until momentum and impulse no longer fit, of a base whose links hang at rest: the motor applies 5 N, and
+    /// the base follows this multiple of it.
+    fn misfit(share: f32) -> Option<u32> {
+        let base = TABLE.stilling.unwrap().imitated.unwrap();
+        let mut state = ChainState { phi: [PI; SENSORS], ..ChainState::upright() };
+        let mut balance = MomentumBalance::default();
+        (0..1000).find(|_| {
+            let total_kg = 1.0 / base.model.inverse_mass + base.taken[0];
+            state.xdot += share * 5.0 / total_kg * TABLE.tick_s;
+            !balance.fits(&state, &base, 5.0, TABLE.tick_s)
+        })
+    }
+
+    #[test]
+    fn a_base_that_does_not_follow_the_motor_is_found() {
+        assert_eq!([1.0, 0.6, 1.4].map(misfit), [None; 3]);
+        let [reversed, runs_away] = [-1.0, 3.0].map(|share| misfit(share).unwrap());
+        assert!(reversed < 70 && runs_away < 70, "{reversed} {runs_away}");
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub use firmware_runs::{Condition, FirmwareRuns, firmware_runs};
 pub use in_table::{designed_table, designed_table_with, with_motions};
 pub use margins::{Margin, margins};
 pub use plan::{MotionJudgement, SwingUpPlan, judge, motions, refined, search};
-pub use recovery::{Recovered, recovered};
+pub use recovery::{Recovered, RecoveryRuns, recovered};
 pub use robustness::{MotionSpread, RandomRuns};
 pub use route::{Route, RouteRuns, TransitionRuns, on_route, route_runs};
 pub use stilling::{Stilled, StillingRuns, Tumbling, quantile_s, stilled};

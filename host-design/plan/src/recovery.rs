@@ -1,5 +1,7 @@
 //! Random runs of the whole firmware in which a pull fells the rig: the motor stills the links and raises them again.
 
+use core::fmt;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -179,5 +181,48 @@ impl Participant for Person {
             self.seen.ended = fault;
         }
         until(stands || is_lost || state == State::Fault)
+    }
+}
+
+/// What the runs say about a rig.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RecoveryRuns {
+    /// Runs in which the rig fell.
+    pub falls: usize,
+    /// Of these, runs in which it balanced again in the end, without a person who touched it.
+    pub recovered: usize,
+    /// Longest time from a fall until the links hung still (s); 0 without one.
+    pub longest_still_s: f64,
+    /// Median of the times from a fall until the rig balanced again (s); infinite if most did not.
+    pub median_upright_s: f64,
+}
+
+impl RecoveryRuns {
+    /// Sums up `all`.
+    pub fn of(all: &[Recovered]) -> Self {
+        let fallen: Vec<&Recovered> = all.iter().filter(|run| run.fall.is_some()).collect();
+        let mut times: Vec<f64> = fallen.iter().map(|run| run.upright_s.unwrap_or(f64::INFINITY)).collect();
+        times.sort_by(f64::total_cmp);
+        Self {
+            falls: fallen.len(),
+            recovered: times.iter().filter(|time| time.is_finite()).count(),
+            longest_still_s: fallen.iter().filter_map(|run| run.still_s).fold(0.0, f64::max),
+            median_upright_s: times.get(times.len() / 2).copied().unwrap_or(f64::INFINITY),
+        }
+    }
+}
+
+impl fmt::Display for RecoveryRuns {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { falls, recovered, longest_still_s, median_upright_s } = self;
+        write!(
+            f,
+            "{recovered} of {falls} stilled and raised again, still after {longest_still_s:.1} s at most"
+        )?;
+        if median_upright_s.is_finite() {
+            write!(f, ", half upright after {median_upright_s:.1} s")
+        } else {
+            Ok(())
+        }
     }
 }

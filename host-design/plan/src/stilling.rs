@@ -96,11 +96,12 @@ fn still(
         status.state == State::Calibrated && is_checked
     })?;
     world.hand.hold_in(&start);
+    let _ = world.tick(&mut [])?;
+    world.let_go();
     match world.ask(Request::Still)? {
         Answer::Done => {}
         answer => return Err(HarnessError::Refused { request: Request::Still, answer }),
     }
-    world.let_go();
     let mut watch = StillingWatch::of(rig);
     world.run((LONGEST_S / rig.tick.period_s) as usize, &mut [&mut RailEnds::of(rig), &mut watch])?;
     Ok(watch.seen)

@@ -72,10 +72,11 @@ pub(crate) fn header(rig: &str, hash: &str) -> String {
 }
 
 /// Hash of everything that a search depends on: the values of the rig file, `[swing_up]` included, but not the zeros of
-/// magnetic sensors and the age of readings, which no motion depends on; that of a potentiometer says where its dead
-/// band is.
+/// magnetic sensors, the age of readings, and for how long the links are stilled after a fall, which no motion depends
+/// on; the zero of a potentiometer says where its dead band is.
 pub(crate) fn request_hash(rig: &Rig) -> String {
     let mut rig = rig.clone();
+    rig.limits.stilling_s = None;
     for link in rig.chain_mut().into_iter().flat_map(|chain| &mut chain.links) {
         (link.sensor_delay_s, link.part, link.errors) = (0.0, None, TurnErrors::default());
         if let Some(LinkEncoder::Absolute { zero_counts, travel_rad: None, .. }) = &mut link.encoder {

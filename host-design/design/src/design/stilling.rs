@@ -82,7 +82,7 @@ pub struct Stilling {
     pub excursion_m: [f64; 2],
     /// Links and imitated base, for the table.
     #[serde(skip)]
-    pub(crate) imitated: Option<ChainParameters<f64>>,
+    pub(crate) imitated: ChainParameters<f64>,
 }
 
 impl Stilling {
@@ -148,7 +148,7 @@ impl Stilling {
             speed_m_per_s: by_energy.min(1.01 * by_drive),
             upright_j,
             excursion_m: [1.0, ENERGIES].map(|times| excursion_m(times * upright_j, stiffness, most_n[0])),
-            imitated,
+            imitated: imitated.unwrap_or_else(|| real.clone()),
         }
     }
 }

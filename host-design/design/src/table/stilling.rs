@@ -32,7 +32,7 @@ pub(super) fn gains(rig: &Rig, soft_m: [f32; 2]) -> Result<Option<StillingGains<
 }
 
 fn imitated(stilling: &Stilling) -> Option<ImitatedBase<MAX_SENSORS>> {
-    let chain = stilling.imitated.as_ref()?;
+    let chain = &stilling.imitated;
     // The firmware's model has a link for each sensor, one more than there are.
     let model = with_links(chain.links(), WithoutCoupling(chain)).ok()??;
     Some(ImitatedBase { taken: stilling.taken.map(|taken| taken as f32), model })

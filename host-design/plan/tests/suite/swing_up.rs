@@ -1,5 +1,7 @@
 //! Swing-up: the stored motions of the rigs in closed loop, and what has to be refused.
 
+use std::path::Path;
+
 use crate::published::{designed, rig, rig_and_table_with_motions, rig_path, stored_motions, table};
 use upright_design::motion::RaiseAndLower;
 use upright_design::numerics::Matrix;
@@ -180,4 +182,28 @@ fn a_damaged_file_is_named_with_what_to_do() {
     std::fs::write(Stored::path_beside(&rig), "{}").unwrap();
     let error = Stored::beside(&rig).unwrap_err().to_string();
     assert!(error.contains("my.swing-up.json") && error.contains("missing field"), "{error}");
+}
+
+#[test]
+fn stored_motions_stay_those_of_a_rig_that_is_stilled_for_another_time_and_of_no_other() {
+    let stored = Stored::beside(&rig_path("single-quanser-ip02")).unwrap();
+    let text = std::fs::read_to_string(rig_path("single-quanser-ip02")).unwrap();
+    let is_of = |text: &str| stored.is_of(&Rig::from_toml(text, Path::new("rig")).unwrap());
+    let limited = |limit: &str| text.replace("\n[limits]\n", &format!("\n[limits]\n{limit}\n"));
+    for limit in ["", "stilling_s = 0", "stilling_s = 3"] {
+        assert!(is_of(&limited(limit)), "{limit}");
+    }
+    assert!(!is_of(&limited("still_time_s = 0.6")));
+    let mut changed = 0;
+    for line in text.lines() {
+        let given = line.split('#').next().unwrap_or_default().trim_end();
+        let is_number = given.contains(" = ") && given.ends_with(|c: char| c.is_ascii_digit() || c == ']');
+        let Some(last) = given.rfind(|c: char| c.is_ascii_digit()).filter(|_| is_number) else { continue };
+        let digit = if &given[last..=last] == "1" { "2" } else { "1" };
+        let other = format!("{}{digit}{}", &given[..last], &given[last + 1..]);
+        let Ok(rig) = Rig::from_toml(&text.replacen(given, &other, 1), Path::new("rig")) else { continue };
+        assert!(!stored.is_of(&rig), "{other}");
+        changed += 1;
+    }
+    assert!(changed > 25, "{changed}");
 }

@@ -10,6 +10,7 @@ use upright_board::UNITS_PER_MICROSECOND;
 
 use super::observed::Observed;
 use super::on_board::OnChip;
+use super::stilled::StilledRun;
 use crate::in_the_loop::{Events, RunError, RunPlace, VirtualBoard};
 use upright_closed_loop::defects::{Defect, Defective, Expected, Phase, Trial};
 use upright_closed_loop::harness::{
@@ -144,6 +145,7 @@ impl DefectRun<'_> {
             defect: self.defective(Some(trial.onset)),
             observed: Observed::default(),
             fault: None,
+            stilled: StilledRun::of(self.rig, self.table),
         };
         world.run(usize::MAX, &mut [&mut balanced])?;
         let mut observed = balanced.observed;
@@ -363,6 +365,7 @@ struct BalancedRun<'r> {
     defect: Defective<'r>,
     observed: Observed,
     fault: Option<Fault>,
+    stilled: StilledRun,
 }
 
 impl Participant for BalancedRun<'_> {
@@ -379,8 +382,15 @@ impl Participant for BalancedRun<'_> {
         let (run, tick) = (self.run, world.ticks());
         let is_on = run.is_on(&world.session, output);
         self.observed.output(tick, *output, is_on, run.ticks_since_stop(&world.session));
-        self.fault = world.session.fault();
-        self.observed.stills |= world.session.status().state == State::Stilling;
+        // What ends the stilling after a fall is not the fault that was found.
+        if !self.observed.stills {
+            self.fault = world.session.fault();
+        }
+        if world.session.status().state == State::Stilling {
+            self.observed.stills = true;
+            let state = world.bench.state();
+            self.observed.astray |= run.is_off_rail(state) || self.stilled.adds_energy(state, tick);
+        }
         if self.observed.off.is_some_and(|off| tick > off + TICKS_AFTER) {
             self.observed.fault = self.fault;
         }
@@ -400,6 +410,8 @@ impl Participant for BalancedRun<'_> {
     }
 
     fn saw(&mut self, world: &mut World<'_>) -> Flow {
-        until(self.run.is_over(world.ticks(), &self.observed))
+        // A board is not watched for so long.
+        let is_stilled = self.run.board.is_none() && world.session.status().state == State::Stilling;
+        until(!(is_stilled && !self.observed.astray) && self.run.is_over(world.ticks(), &self.observed))
     }
 }

@@ -91,7 +91,7 @@ fn class(
 ) -> Result<Class, RunError> {
     let on_board = matches!(setup.place, RunPlace::Board { .. });
     Ok(match trial.expected() {
-        _ if observed.on_again && !observed.stills => Class::Missed,
+        _ if observed.astray || (observed.on_again && !observed.stills) => Class::Missed,
         Expected::Fault(fault, within) => {
             of_fault(setup.table, (observed, trial.phase), fault, within, ticks, on_board)
         }

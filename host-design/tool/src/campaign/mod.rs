@@ -25,6 +25,7 @@ mod observed;
 mod on_board;
 mod push;
 mod shaken;
+mod stilled;
 mod tally;
 
 pub use attempt::{During, Setup};

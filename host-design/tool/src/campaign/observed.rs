@@ -16,6 +16,8 @@ pub(super) struct Observed {
     pub(super) on_again: bool,
     /// … to still the links after a fall, as the table allows.
     pub(super) stills: bool,
+    /// Whether the cart left its rail meanwhile, the motor added energy, or it stilled the links for too long.
+    pub(super) astray: bool,
     /// First tick in which the defect was visible: the rig differed from a healthy one by more than a threshold.
     pub(super) visible: Option<usize>,
     /// Whether a link or the cart was far beyond its limit while the motor was on.

@@ -39,6 +39,24 @@ fn every_defect_is_found_and_nothing_else() {
     }
 }
 
+/// What looks like a fall may be a motor or a sensor that is reversed: then stilling must not drive the cart away.
+#[test]
+fn a_motor_that_would_add_energy_after_a_fall_is_off_before_it_does() {
+    let (rig, table) = rig_and_table("quadruple-paper");
+    let reversed = |table: &TableValues| {
+        let kinds =
+            [Defect::MotorReversed, Defect::MotorStuck, Defect::EncoderReversed, Defect::EncodersSwapped];
+        run(&on_host(rig, table), &kinds, 24).rows.iter().map(|row| row.missed).collect::<Vec<_>>()
+    };
+    let mut stilling = table.clone();
+    stilling.stilling.as_mut().unwrap().after_fall_ticks = 20_000;
+    assert_eq!(reversed(&stilling), [0; 4]);
+    // Without the model of links and base, there is no momentum to compare.
+    let mut blind = stilling;
+    blind.stilling.as_mut().unwrap().imitated = None;
+    assert_eq!(reversed(&blind)[..2], [6, 6], "negative control");
+}
+
 #[test]
 fn a_late_force_that_the_rig_file_states_hides_no_defect() {
     let mut rig = rig_and_table("quadruple-paper").0.clone();

@@ -13,9 +13,9 @@ use upright_design::simulate::Trace;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
 use upright_plan::{
-    Condition, FirmwareRuns, Margin, MotionJudgement, Script, SolvedCandidate, StillingRuns, Stored,
-    SwingUpError, SwingUpPlan, Tumbling, designed_table, firmware_runs, judge, margins, motions, refined,
-    search, solved, stilled,
+    Condition, FirmwareRuns, Margin, MotionJudgement, RecoveryRuns, Script, SolvedCandidate, StillingRuns,
+    Stored, SwingUpError, SwingUpPlan, Tumbling, designed_table, firmware_runs, judge, margins, motions,
+    recovered, refined, search, solved, stilled,
 };
 use upright_tool::figure::{Figure, margins_figure, run_svg, stroboscope_svg, trade_figure};
 use upright_tool::in_the_loop::RunError;
@@ -35,6 +35,7 @@ use upright_command::{print, warn_of_an_arm};
 Examples:
   upright swing-up rigs/quadruple-paper.toml                  search, judge, write rigs/quadruple-paper.swing-up.json
   upright swing-up rigs/quadruple-paper.toml --stored         judge the stored motions again, in seconds
+  upright swing-up rigs/quadruple-paper.toml --stored --falls 100    and how many of 100 falls are recovered
   upright swing-up rigs/quadruple-paper.toml --check          search again; exit status 1 if the file differs
   upright swing-up rigs/quadruple-paper.toml --table          200 runs of the firmware with each of eight errors
   upright swing-up rigs/quadruple-paper.toml --margins        how hard each link may be pushed on the way
@@ -77,6 +78,9 @@ pub(crate) struct SwingUpCommand {
     /// Duration against force and robustness of the candidates of a search
     #[arg(long, conflicts_with_all = ["margins", "table", "stored", "check", "no_write", "picture"])]
     trade: bool,
+    /// Fell the raised rig so many times: how often the motor stills the links and they are raised again
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with_all = ["table", "margins", "trade"])]
+    falls: u32,
     /// Seed of the complete run; with --trade, of candidates and random runs
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -183,13 +187,25 @@ impl SwingUpCommand {
             write_atomically(&file, plan.stored.to_json().as_bytes())?;
         }
         let stilling = stilling(&rig, &plan.table).map_err(failed)?;
-        let object =
-            json!({ "rig": rig.name, "raise": plan.raise, "lower": plan.lower, "stilling": stilling });
-        print(self.json, &object, || text(&rig, &plan) + &stilling_text(&stilling))?;
+        let falls = self.falls(&rig, &plan.table).map_err(failed)?;
+        let object = json!({
+            "rig": rig.name, "raise": plan.raise, "lower": plan.lower, "stilling": stilling, "falls": falls,
+        });
+        let falls = || falls.map_or(String::new(), |falls| format!("\nfalls\n  {falls}\n"));
+        print(self.json, &object, || text(&rig, &plan) + &stilling_text(&stilling) + &falls())?;
         if self.check && differs {
             return Err(Failure::check(format!("{} differs from these motions", file.display())));
         }
         Ok(())
+    }
+
+    /// Runs in which the rig is felled, if they are wanted.
+    fn falls(&self, rig: &Rig, table: &TableValues) -> Result<Option<RecoveryRuns>, SwingUpError> {
+        if self.falls == 0 {
+            return Ok(None);
+        }
+        let runs = || recovered(rig, table, (1, u64::from(self.falls)), &Study::whole());
+        Ok(Some(RecoveryRuns::of(&with_spinner("falls", runs)?)))
     }
 
     /// Writes the files that are wanted of a run, in which the rig is raised for `raised_s`.
