@@ -226,3 +226,25 @@ impl fmt::Display for RecoveryRuns {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_does_not_stand_again_is_not_recovered_and_one_that_never_fell_does_not_count() {
+        let fell = |still_s, upright_s| Recovered {
+            fall: Some("angle".to_owned()),
+            still_s,
+            upright_s,
+            ended: None,
+        };
+        let runs =
+            [fell(Some(3.0), Some(8.0)), fell(Some(5.0), None), Recovered::default(), fell(None, None)];
+        let found = RecoveryRuns::of(&runs);
+        assert_eq!((found.falls, found.recovered, found.longest_still_s), (3, 1, 5.0));
+        assert_eq!(found.median_upright_s, f64::INFINITY, "most do not stand again");
+        assert!(found.to_string().starts_with("1 of 3 "), "{found}");
+        assert_eq!(RecoveryRuns::of(&runs[..1]).median_upright_s, 8.0);
+    }
+}
