@@ -71,6 +71,11 @@ impl Prebuilt {
         code.map(|code| with_code(board, rig, table, code)).transpose()
     }
 
+    /// Whether there is code for rigs like that of `table`.
+    pub fn has(&self, board: &BoardRow, table: &TableValues) -> bool {
+        self.code(&class_name(board, table)).is_some()
+    }
+
     /// Compiles the code for rigs like that of `table`, and takes it in, with its ticks as far as they are known.
     ///
     /// # Errors

@@ -33,6 +33,11 @@ impl ClassTicks {
         Self { longest_ns, note: Some((path, hash)) }
     }
 
+    /// None that was measured, and none that will be kept.
+    pub fn unknown() -> Self {
+        Self::known(None)
+    }
+
     /// Those of code that was measured elsewhere (ns).
     pub(super) fn known(longest_ns: Option<u64>) -> Self {
         Self { longest_ns, note: None }

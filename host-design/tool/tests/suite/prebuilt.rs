@@ -9,7 +9,7 @@ use upright_design::rig::Rig;
 use upright_design::table::TableValues;
 use upright_plan::up_and_down;
 use upright_test_support::limits::output;
-use upright_tool::image::{BuiltImage, PREBUILT_VARIABLE, Prebuilt, SPREAD, build_for};
+use upright_tool::image::{BuiltImage, ClassTicks, PREBUILT_VARIABLE, Prebuilt, SPREAD, build_for};
 use upright_tool::in_the_loop::{VirtualBoard, run_compared};
 
 use crate::equipment::if_possible;
@@ -20,9 +20,12 @@ fn prebuilt(folder: &Path, boards: &[&'static BoardRow]) -> Option<Prebuilt> {
     let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
     let mut images = Prebuilt::none_by("of this test");
     for board in boards {
-        let mut ticks = if_possible(build_for(board, rig, table), "prebuilt images")?.ticks;
+        if_possible(build_for(board, rig, table), "prebuilt images")?;
+        let mut ticks = ClassTicks::unknown();
         ticks.keep(30.0);
+        assert!(!images.has(board, table));
         images.take_in(board, table, &ticks).unwrap();
+        assert!(images.has(board, table));
     }
     let path = folder.join("images.lzma");
     std::fs::write(&path, images.packed()).unwrap();
@@ -39,7 +42,7 @@ fn flashed(image: &BuiltImage) -> Vec<u8> {
 fn equal(prebuilt: &Prebuilt, board: &'static BoardRow, (rig, table): &(Rig, TableValues)) -> BuiltImage {
     let compiled = flashed(&build_for(board, rig, table).unwrap());
     let image = prebuilt.build_for(board, rig, table).unwrap().unwrap();
-    assert!(image.ticks.bound_us() >= Some(30.0 * SPREAD));
+    assert_eq!(image.ticks.bound_us(), Some(30.0 * SPREAD));
     assert!(compiled.len() > 20_000 && flashed(&image) == compiled, "{board} {}", rig.name);
     image
 }

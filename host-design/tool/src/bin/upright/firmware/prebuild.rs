@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use upright::boards::{BOARDS, BoardRow};
 use upright_design::table::write_atomically;
-use upright_tool::image::{self, PREBUILT_FILE, Prebuilt, check_table, compiler};
+use upright_tool::image::{self, ClassTicks, PREBUILT_FILE, Prebuilt, check_table, compiler};
 
 use super::board::board;
 use super::built::{ForRig, designed};
@@ -23,7 +23,7 @@ Examples:
   upright firmware prebuild rigs/single-quanser-ip02.toml rigs/quadruple-paper.toml
   upright firmware prebuild rigs/single-quanser-ip02.toml --board pico --out pico.lzma")]
 pub(crate) struct PrebuildCommand {
-    /// Rig files (TOML), one or more for each kind of rig
+    /// Rig files (TOML); of rigs of the same kind, the ticks of the first one are measured
     #[arg(required = true)]
     rigs: Vec<PathBuf>,
     /// Boards, by the names that `upright firmware boards` lists [default: all]
@@ -58,8 +58,12 @@ fn take_in_kind(prebuilt: &mut Prebuilt, path: &Path, boards: &[&'static BoardRo
         tables.push(without);
     }
     for table in tables {
-        for &board in boards.iter().filter(|board| check_table(board, &table).is_ok()) {
-            let image = building(board, || image::build_for(board, &rig, &table))?;
+        let is_wanted =
+            |board: &&&'static BoardRow| check_table(board, &table).is_ok() && !prebuilt.has(board, &table);
+        for board in boards.iter().filter(is_wanted).copied().collect::<Vec<_>>() {
+            let mut image = building(board, || image::build_for(board, &rig, &table))?;
+            // What is packed does not depend on what was built here before.
+            image.ticks = ClassTicks::unknown();
             let mut built = ForRig { image, rig: rig.clone(), table: table.clone() };
             check_ticks(board, &mut built)?;
             prebuilt.take_in(board, &table, &built.image.ticks)?;
