@@ -66,12 +66,12 @@ struct Contents {
     formats: [u32; 2],
     /// Output of `rustc -vV`.
     compiler: String,
-    images: Vec<Entry>,
+    images: Vec<PackedImage>,
 }
 
 /// An image in a file of prebuilt images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Entry {
+struct PackedImage {
     /// Of board, numbers of states and sensors, and kinds of drive and sensors.
     class: String,
     /// The longest tick of a rig (ns), where the virtual board measures it.
@@ -122,7 +122,7 @@ impl Prebuilt {
             return Err(PrebuiltError::Format { path: path.to_owned(), formats: contents.formats });
         }
         let mut images = BTreeMap::new();
-        for Entry { class, longest_ns, bytes } in contents.images {
+        for PackedImage { class, longest_ns, bytes } in contents.images {
             let (elf, next) = rest.split_at_checked(bytes).ok_or_else(damaged)?;
             images.insert(class, (elf.to_owned(), ClassTicks::known(longest_ns)));
             rest = next;
@@ -153,7 +153,7 @@ impl Prebuilt {
 
     /// The bytes of their file.
     pub fn packed(&self) -> Vec<u8> {
-        let entry = |(class, (elf, ticks)): (&String, &(Vec<u8>, ClassTicks))| Entry {
+        let entry = |(class, (elf, ticks)): (&String, &(Vec<u8>, ClassTicks))| PackedImage {
             class: class.clone(),
             longest_ns: ticks.longest_ns(),
             bytes: elf.len(),

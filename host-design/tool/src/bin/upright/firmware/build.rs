@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::board::BoardOption;
-use super::built::{Code, built};
+use super::built::{CodeOrigin, built};
 use super::cycles::check_ticks;
 use crate::variation::Wanted;
 use upright_command::Failure;
@@ -45,7 +45,7 @@ impl BuildCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
         let mut built =
-            built(self.on.board, self.rig.as_deref(), wanted, Code::from_option(self.from_source))?;
+            built(self.on.board, self.rig.as_deref(), wanted, CodeOrigin::from_option(self.from_source))?;
         check_ticks(self.on.board, &mut built)?;
         writeln!(std::io::stdout(), "{}", built.image.flashed().display())?;
         Ok(())

@@ -18,16 +18,16 @@ pub(super) struct ForRig {
     pub(super) table: TableValues,
 }
 
-/// The code of an image.
+/// Where the code of an image comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Code {
+pub(super) enum CodeOrigin {
     /// Prebuilt, if the tool has it for this board and rigs like this one, otherwise compiled.
     Prebuilt,
     /// Compiled from the sources.
     Compiled,
 }
 
-impl Code {
+impl CodeOrigin {
     /// What the option `--from-source` asks for.
     pub(super) fn from_option(from_source: bool) -> Self {
         if from_source { Self::Compiled } else { Self::Prebuilt }
@@ -39,9 +39,9 @@ pub(super) fn built(
     board: &'static BoardRow,
     rig: Option<&Path>,
     wanted: Wanted,
-    code: Code,
+    code: CodeOrigin,
 ) -> Result<ForRig, Failure> {
-    let prebuilt = if code == Code::Prebuilt { Prebuilt::find()? } else { None };
+    let prebuilt = if code == CodeOrigin::Prebuilt { Prebuilt::find()? } else { None };
     let (rig, table) = match rig {
         Some(path) => designed_for(board, path, wanted)?,
         None => committed(board)?,

@@ -7,7 +7,7 @@ use clap::Args;
 use upright::boards::Family;
 
 use super::board::BoardOption;
-use super::built::{Code, built};
+use super::built::{CodeOrigin, built};
 use super::cycles::check_ticks;
 use super::drive::copy_to_drive;
 use crate::variation::Wanted;
@@ -44,7 +44,7 @@ impl FlashCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wanted = if self.no_motions { Wanted::Nothing } else { Wanted::from_option(self.transitions) };
         let board = self.on.board;
-        let build = || built(board, self.rig.as_deref(), wanted, Code::from_option(self.from_source));
+        let build = || built(board, self.rig.as_deref(), wanted, CodeOrigin::from_option(self.from_source));
         match &board.family {
             Family::Rp(rp) => copy_to_drive(board, rp.chip.drive(), build()?.image.flashed()),
             Family::F4(f4) => {

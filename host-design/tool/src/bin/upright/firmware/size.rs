@@ -10,7 +10,7 @@ use upright_tool::image::{
 };
 
 use super::board::BoardOption;
-use super::built::{Code, built};
+use super::built::{CodeOrigin, built};
 use crate::variation::Wanted;
 use upright_command::Failure;
 use upright_command::print;
@@ -43,7 +43,9 @@ impl SizeCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let path = match self.elf {
             Some(path) => path,
-            None => built(self.on.board, self.rig.as_deref(), Wanted::SwingUp, Code::Compiled)?.image.elf,
+            None => {
+                built(self.on.board, self.rig.as_deref(), Wanted::SwingUp, CodeOrigin::Compiled)?.image.elf
+            }
         };
         let image = LinkedImage::read(&path)?;
         let (size, stack, forbidden) = (size(&image)?, stack_bound(&image), forbidden_functions(&image));
