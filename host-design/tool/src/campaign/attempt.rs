@@ -412,6 +412,6 @@ impl Participant for BalancedRun<'_> {
     fn saw(&mut self, world: &mut World<'_>) -> Flow {
         // A board is not watched for so long.
         let is_stilled = self.run.board.is_none() && world.session.status().state == State::Stilling;
-        until(!(is_stilled && !self.observed.astray) && self.run.is_over(world.ticks(), &self.observed))
+        until((!is_stilled || self.observed.astray) && self.run.is_over(world.ticks(), &self.observed))
     }
 }
