@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use upright_design::export::c_header;
-use upright_design::rig::{CartOnly, Rig, RigText};
+use upright_design::rig::{Rig, RigText};
 use upright_design::table::gains_source;
 
 use crate::changes::{changed, differences};
@@ -95,10 +95,6 @@ impl Desk {
             return Ok(json!({ "lab": shown(&question.toml).map_err(PageRefusal::Lab)? }));
         }
         let rig = Rig::from_toml(&question.toml, Path::new(FILE))?;
-        // What is compared needs no picture.
-        if !matches!(question.wanted, Asked::Fingerprint { .. }) {
-            rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
-        }
         let motions = question.motions.as_deref();
         match &question.wanted {
             Asked::Check => Ok(sketch(&rig, &RigText::parse(&question.toml, Path::new(FILE))?)),

@@ -1,7 +1,7 @@
 //! What a page draws of a rig before it is designed.
 
 use serde_json::{Value, json};
-use upright_design::rig::{Link, LinkEncoder, PlantDescription, Rig, RigText};
+use upright_design::rig::{Chain, Link, LinkEncoder, PlantDescription, Quantity, Rig, RigText};
 
 use crate::changes::dials;
 
@@ -16,6 +16,7 @@ pub(crate) fn sketch(rig: &Rig, text: &RigText) -> Value {
     // Without a limit, JSON has null.
     let travel_m = travel_m.map(|end| end.filter(|end: &f64| end.is_finite()));
     json!({
+        "base": drawn_base(rig),
         "input": rig.input_quantity().title(),
         "rig": rig.name,
         "lengths_m": lengths_m,
@@ -26,10 +27,28 @@ pub(crate) fn sketch(rig: &Rig, text: &RigText) -> Value {
         "states": rig.states(),
         "tick_s": rig.tick.period_s,
         "dials": dials(rig, text),
-        "fields": fields(rig),
+        "fields": fields(rig, text),
         "weights": rig.lqr.as_ref().map(|lqr| json!({ "states": lqr.state_weights, "force": lqr.force_weight })),
         "unusual": rig.unusual_values(),
     })
+}
+
+/// What carries the links, as a page names and draws it: `arc_m` is the way of the first joint per unit of its
+/// position.
+pub(crate) fn drawn_base(rig: &Rig) -> Value {
+    let base = rig.base();
+    json!({
+        "noun": base.noun(),
+        "turns": !base.is_cart(),
+        "position": shown_quantity(base.position()),
+        "force": shown_quantity(base.force()),
+        "arc_m": rig.chain().map_or(1.0, Chain::arc_m),
+    })
+}
+
+/// Name and unit of a quantity.
+pub(crate) fn shown_quantity(Quantity { name, unit }: Quantity) -> [&'static str; 2] {
+    [name, unit]
 }
 
 /// The kind of the drive, of those that a page has pictures of.
@@ -54,15 +73,22 @@ fn sensors(rig: &Rig) -> Option<&'static str> {
     }
 }
 
-/// The numbers that a page offers as fields: keys of the rig file, with label, unit and value.
-fn fields(rig: &Rig) -> Vec<Value> {
+/// The numbers that a page offers as fields: keys of the rig file, as a file with a cart calls them, too, with label,
+/// unit and value. `text` is the rig's file.
+fn fields(rig: &Rig, text: &RigText) -> Vec<Value> {
     let mut fields = Vec::new();
     let mut field = |key: &str, label: &str, unit: &str, value: Option<f64>| {
-        fields.extend(value.map(|value| json!({ "key": key, "label": label, "unit": unit, "value": value })));
+        let label = rig.words(label);
+        let told = |value| json!({ "key": rig.base().path(key), "on_cart": key, "label": label, "unit": unit, "value": value });
+        fields.extend(value.map(told));
     };
+    let base = rig.base();
+    let [position, force] = [base.position().unit, base.force().unit];
+    let per_count = format!("{position}/count");
     if let PlantDescription::Chain(chain) = &rig.plant {
         // A drive that imposes the cart's acceleration does not care for its mass.
-        field("cart.mass_kg", "mass of the cart", "kg", chain.cart.mass_kg);
+        field("cart.mass_kg", "mass of the cart", base.mass().unit, chain.cart.mass_kg);
+        field("cart.radius_m", "distance of the links from the axis", "m", text.number("cart.radius_m"));
         for (number, link) in (1..).zip(&chain.links) {
             let mut of_link = |name: &str, label: &str, unit: &str, value| {
                 field(&format!("link[{number}].{name}"), &format!("{label} of link {number}"), unit, value);
@@ -82,16 +108,22 @@ fn fields(rig: &Rig) -> Vec<Value> {
                 None => {}
             }
         }
-        field("cart.encoder_step_m", "sensor of the cart", "m/count", chain.cart.encoder_step_m);
+        let counts = text.number("cart.encoder_counts_per_rev");
+        field("cart.encoder_counts_per_rev", "sensor of the cart", "counts/rev", counts);
+        let step_m = chain.cart.encoder_step_m.filter(|_| counts.is_none());
+        field("cart.encoder_step_m", "sensor of the cart", &per_count, step_m);
     }
     let actuator = &rig.actuator;
-    field("actuator.force_limit_n", "force limit", "N", actuator.force().and_then(|force| force.limit_n));
+    let limit = |quantity: Quantity| format!("{} limit", quantity.name);
+    let largest = actuator.force().and_then(|force| force.limit_n);
+    field("actuator.force_limit_n", &limit(base.force()), force, largest);
     field("actuator.supply_v", "supply", "V", actuator.motor().map(|motor| motor.supply_v));
     if let Some(drive) = actuator.pulses() {
-        let limit = Some(drive.acceleration_limit_m_per_s2);
-        field("actuator.step_m", "travel per pulse", "m", Some(drive.step_m));
-        field("actuator.acceleration_limit_m_per_s2", "acceleration limit", "m/s²", limit);
-        field("actuator.speed_limit_m_per_s", "speed limit", "m/s", drive.speed_limit_m_per_s);
+        let (acceleration, speed) = (base.acceleration(), base.speed());
+        let most = Some(drive.acceleration_limit_m_per_s2);
+        field("actuator.step_m", "travel per pulse", position, Some(drive.step_m));
+        field("actuator.acceleration_limit_m_per_s2", &limit(acceleration), acceleration.unit, most);
+        field("actuator.speed_limit_m_per_s", &limit(speed), speed.unit, drive.speed_limit_m_per_s);
         field("actuator.step_rate_limit_hz", "most pulses", "Hz", drive.step_rate_limit_hz);
     }
     field("tick.period_s", "tick", "s", Some(rig.tick.period_s));
@@ -106,12 +138,16 @@ mod tests {
 
     #[test]
     fn each_field_is_a_key_of_the_file_with_its_value() {
-        for (name, count) in [("single-stepper", 8), ("quadruple-paper", 16), ("quadruple-paper-printed", 1)]
-        {
+        for (name, count) in [
+            ("single-stepper", 8),
+            ("quadruple-paper", 16),
+            ("quadruple-paper-printed", 1),
+            ("single-qube-servo-2", 8),
+        ] {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../rigs/{name}.toml"));
             let toml = std::fs::read_to_string(&file).unwrap();
             let rig = Rig::from_toml(&toml, &file).unwrap();
-            let fields = fields(&rig);
+            let fields = fields(&rig, &RigText::parse(&toml, &file).unwrap());
             assert_eq!(fields.len(), count, "{name}: {fields:?}");
             for field in &fields {
                 // The same value changes nothing; another one changes the rig.

@@ -95,12 +95,12 @@ fn typical(
     let mut said = Vec::new();
     for size in [poor, good] {
         let runs = of_size(rig, table, trust.linear.law, &settings, imperfection, size)?;
-        said.push(format!("{} {}: {}", significant(size, 2), imperfection.unit, runs.text()));
+        said.push(format!("{} {}: {}", significant(size, 2), imperfection.unit, runs.text(rig.base())));
         if runs.ended_by.is_none() {
             break;
         }
     }
-    Ok(json!([imperfection.key, said.join("; "), imperfection.remedy]))
+    Ok(json!([imperfection.key, said.join("; "), rig.base().words(imperfection.remedy)]))
 }
 
 #[cfg(test)]

@@ -1,8 +1,34 @@
 //! Machines with one imperfection alone.
 
-use crate::rig::{IMPERFECTIONS, Imperfection, PerJoint, Reality, Rig, VERIFY};
+use std::sync::LazyLock;
+
+use crate::rig::{ArmSizes, Base, IMPERFECTIONS, Imperfection, Key, PerJoint, Reality, Rig, Slider, VERIFY};
+
+/// [`IMPERFECTIONS`] as an arm has them.
+static ON_ARM: LazyLock<Vec<Imperfection>> =
+    LazyLock::new(|| IMPERFECTIONS.iter().map(Imperfection::of_arm).collect());
 
 impl Imperfection {
+    /// Every imperfection of machines with this base, in the order of `[verify]`.
+    pub fn of_base(base: Base) -> &'static [Self] {
+        match base {
+            Base::Cart => IMPERFECTIONS,
+            Base::Arm => &ON_ARM,
+        }
+    }
+
+    fn of_arm(&self) -> Self {
+        let Key { name, unit, .. } = Base::Arm.key(&VERIFY, self.key);
+        let mut row = *self;
+        (row.key, row.unit) = (name, unit);
+        if let Some(ArmSizes { typical, source, remedy, slider }) = self.on_arm {
+            let on_arm = |(slider, (unit, range)): (Slider, _)| Slider { unit, range, ..slider };
+            (row.typical, row.source, row.remedy) = (typical, source, remedy);
+            row.slider = self.slider.zip(slider).map(on_arm);
+        }
+        row
+    }
+
     /// The machine of `rig` with this imperfection alone, of this size; a lag is that beyond the stated one.
     pub fn on(&self, rig: &Rig, size: f64) -> Rig {
         self.on_with_bristle(rig, size, None)
@@ -38,7 +64,7 @@ impl Imperfection {
 
     /// Those that are simulated on the machine of `rig`.
     pub fn all_of(rig: &Rig) -> Vec<&'static Self> {
-        IMPERFECTIONS.iter().filter(|one| one.not_on(rig).is_none()).collect()
+        Self::of_base(rig.base()).iter().filter(|one| one.not_on(rig).is_none()).collect()
     }
 
     /// Why this imperfection is not simulated on the machine of `rig`, if it is not.

@@ -133,7 +133,7 @@ impl Base {
     }
 
     /// The row of the key that a file with a cart calls `name`.
-    pub(super) fn key(self, section: &'static Section, name: &str) -> Key {
+    pub(crate) fn key(self, section: &'static Section, name: &str) -> Key {
         let key = *section.key(name);
         let row = ON_ARM.iter().find(|row| row.section == section.name && row.cart == Some(name));
         match (self, row) {

@@ -10,12 +10,8 @@ use super::error::{RigError, RigErrorKind};
 pub enum CartOnly {
     /// Its parameters are those of a cart.
     Identification,
-    /// Its typical sizes and its advice are for a rail.
-    Imperfections,
     /// It writes a slide.
     OtherSimulators,
-    /// It draws a rail.
-    Page,
     /// It speaks of metres and newtons.
     Conversation,
 }
@@ -24,9 +20,7 @@ impl CartOnly {
     fn name(self) -> &'static str {
         match self {
             Self::Identification => "identification",
-            Self::Imperfections => "the search for the sizes of imperfections",
             Self::OtherSimulators => "the model for other simulators",
-            Self::Page => "the page",
             Self::Conversation => "the conversation with a board",
         }
     }

@@ -54,6 +54,7 @@ pub use rule::Rule;
 pub use sections::actuator::{AccelerationDrive, Actuator, ForceDrive, Motor};
 pub use sections::chain::{Cart, CartInput, Chain, MAX_LINKS, PlantDescription};
 pub use sections::friction::KnownFriction;
+pub(crate) use sections::imperfections::ArmSizes;
 pub use sections::imperfections::{Allowance, IMPERFECTIONS, Imperfection, LargestSize, Slider};
 pub use sections::integral::Integral;
 pub use sections::kalman::KalmanNoise;

@@ -6,7 +6,7 @@ use upright::table::Equilibrium;
 use upright_design::design::{Cost, dare, design};
 use upright_design::numerics::Matrix;
 use upright_design::plant::{ChainParameters, linearise};
-use upright_design::rig::{Base, CartOnly, Rig, RigText};
+use upright_design::rig::{Base, CartOnly, IMPERFECTIONS, Imperfection, Rig, RigText};
 use upright_design::table::{Gains, TableValues, gains_source};
 
 const QUBE: &str = include_str!("../../../../rigs/single-qube-servo-2.toml");
@@ -219,4 +219,21 @@ fn the_table_of_an_arm_is_in_radians() {
     let source = gains_source(&rig, &table);
     assert!(source.contains("arm position (rad), arm speed (rad/s)"), "{source}");
     assert!(source.contains("speed_m_per_s: 12.0"), "{source}");
+}
+
+#[test]
+fn imperfections_of_an_arm_have_its_keys_and_units_and_sizes() {
+    let rig = parse(QUBE).unwrap();
+    let of_arm = Imperfection::all_of(&rig);
+    assert_eq!(of_arm.len() + 1, IMPERFECTIONS.len(), "a rail alone has a slope");
+    for row in &of_arm {
+        let required = format!("{QUBE}\n[verify]\n{} = {}\n", row.key, row.typical[0]);
+        assert_eq!(parse(&required).unwrap().must_survive[0].1, row.typical[0], "{}", row.key);
+    }
+    let of = |rows: &[Imperfection], key: &str| rows.iter().find(|row| row.key == key).copied().unwrap();
+    let backlash = of(Imperfection::of_base(Base::Arm), "backlash_rad");
+    assert_eq!((backlash.unit, backlash.typical), ("rad", [5e-3, 3.5e-2]));
+    // Negative control: a cart's row and its key are not those of an arm.
+    assert_eq!(of(Imperfection::of_base(Base::Cart), "backlash_m").typical, [2e-5, 2e-4]);
+    assert!(parse(&format!("{QUBE}\n[verify]\nbacklash_m = 2e-5\n")).is_err());
 }

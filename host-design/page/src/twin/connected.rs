@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use upright::supervision::supervisor::State;
 use upright_closed_loop::client::ExpectedRig;
 use upright_closed_loop::conversation::Monitor;
-use upright_design::rig::{CartOnly, Rig};
+use upright_design::rig::Rig;
 
 use super::console::Console;
 use super::greeting::greeting;
@@ -45,9 +45,8 @@ impl ConnectedBoard {
     /// A conversation with the board of this rig, and the greeting for the page.
     pub(super) fn connect(toml: &str, motions: Option<&str>) -> Result<(Self, Value), PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
-        rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
         let table = DeskDesign::design(&rig)?.table_with(&rig, motions)?;
-        let board = Self { console: Console::new(Monitor::new(LINE)), expected: (&rig).into() };
+        let board = Self { console: Console::new(Monitor::new(LINE), rig.base()), expected: (&rig).into() };
         Ok((board, json!({ "hello": greeting(&rig, &table, LINE, None), "you": VIEWER })))
     }
 

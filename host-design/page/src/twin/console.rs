@@ -8,6 +8,7 @@ use upright::supervision::supervisor::State;
 use upright_closed_loop::client::AnyTelemetry;
 use upright_closed_loop::conversation::record::{TelemetryCsv, json as telemetry_json};
 use upright_closed_loop::conversation::{Monitor, MonitorAction, request as command, words};
+use upright_design::rig::Base;
 
 /// Longest recording (bytes).
 const MAX_RECORDING: usize = 256 << 20;
@@ -18,15 +19,16 @@ const MAX_FRESH: usize = 2000;
 pub struct Console {
     /// The conversation.
     pub monitor: Monitor,
+    base: Base,
     fresh: Vec<Value>,
     recorder: Option<TelemetryCsv<Vec<u8>>>,
     recorded: Option<Vec<u8>>,
 }
 
 impl Console {
-    /// A console with a new conversation.
-    pub fn new(monitor: Monitor) -> Self {
-        Self { monitor, fresh: Vec::new(), recorder: None, recorded: None }
+    /// A console with a new conversation with a rig that has this base.
+    pub fn new(monitor: Monitor, base: Base) -> Self {
+        Self { monitor, base, fresh: Vec::new(), recorder: None, recorded: None }
     }
 
     /// Takes telemetry that the firmware has sent: for the next picture, and for the recording.
@@ -42,7 +44,11 @@ impl Console {
             }
             if self.fresh.len() < MAX_FRESH {
                 let mut object = telemetry_json(&telemetry);
-                object["now"] = json!(words::instruction(&telemetry));
+                for name in ["against_arming", "against_swing_up"] {
+                    let texts = object[name].as_array_mut().into_iter().flatten();
+                    texts.for_each(|text| *text = self.base.words(text.as_str().unwrap_or_default()).into());
+                }
+                object["now"] = json!(words::instruction(&telemetry).map(|text| self.base.words(&text)));
                 object["inputs"] = json!(words::inputs(&telemetry));
                 self.fresh.push(object);
             }
@@ -110,7 +116,7 @@ impl Console {
 
     /// The next picture: the telemetry since the picture before, `machine`, and who is in command.
     pub fn picture(&mut self, machine: &Value, commander: Option<u64>) -> Value {
-        let monitor = &mut self.monitor;
+        let (monitor, base) = (&mut self.monitor, self.base);
         let fault = monitor.telemetry.as_ref().and_then(|telemetry| telemetry.fault);
         let entry = fault.map(|fault| fault.entry());
         json!({
@@ -123,13 +129,13 @@ impl Console {
             "fault": entry.map(|entry| json!({
                 "code": fault.map(|fault| fault.code()),
                 "name": entry.name,
-                "condition": entry.condition,
-                "remedy": entry.remedy,
+                "condition": base.words(entry.condition),
+                "remedy": base.words(entry.remedy),
                 "at": monitor.cause.filter(|cause| Some(cause.fault) == fault)
-                    .and_then(|cause| cause.sensor).map(words::joint),
+                    .and_then(|cause| cause.sensor).map(|sensor| base.words(&words::joint(sensor))),
             })),
             "ended": monitor.ended.as_ref().map(ToString::to_string),
-            "log": monitor.log.drain(..).collect::<Vec<_>>(),
+            "log": monitor.log.drain(..).map(|line| base.words(&line)).collect::<Vec<_>>(),
         })
     }
 }

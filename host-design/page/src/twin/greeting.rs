@@ -8,6 +8,7 @@ use upright_design::rig::{PlantDescription, Rig};
 use upright_design::table::TableValues;
 
 use super::property::Properties;
+use crate::sketch::{drawn_base, shown_quantity};
 
 /// Most links of a chain that stands while a person goes on pulling one of them.
 const FEW_LINKS: usize = 2;
@@ -15,6 +16,7 @@ const FEW_LINKS: usize = 2;
 /// The rig, its limits, and what can be done with it. `defects` are those that can begin; none if it is a real machine.
 pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[Defect]>) -> Value {
     let is_simulated = defects.is_some();
+    let (base, takes_pulses) = (rig.base(), table.drive.pulses().is_some());
     let (lengths, travel) = match &rig.plant {
         PlantDescription::Chain(chain) => {
             (chain.links.iter().map(|link| link.length_m).collect::<Vec<_>>(), chain.cart.travel_m.map(Some))
@@ -50,16 +52,18 @@ pub fn greeting(rig: &Rig, table: &TableValues, place: &str, defects: Option<&[D
         "setpoints_m": table.limits.setpoints_m(),
         "angle_limit_rad": table.limits.angle_rad,
         "force_limit_n": table.drive.largest_force_n(),
-        "input": if table.drive.pulses().is_some() { ["Acceleration", "m/s²"] } else { ["Force", "N"] },
+        "base": drawn_base(rig),
+        "input": shown_quantity(if takes_pulses { base.acceleration() } else { base.force() }),
+        "push_unit": if takes_pulses { "N" } else { base.force().unit },
         "step": table.observer.as_ref()
             .map(|_| table.rows().iter().map(|sensor| sensor.step).collect::<Vec<_>>()),
-        "sensors": (0..table.sensors()).map(|sensor| words::joint(sensor as u8)).collect::<Vec<_>>(),
+        "sensors": (0..table.sensors()).map(|sensor| base.words(&words::joint(sensor as u8))).collect::<Vec<_>>(),
         "laws": table.laws.present().map(|(law, _)| json!({ "name": law.option(), "title": law.title(), "value": law }))
             .collect::<Vec<Value>>(),
-        "states": states.map(|state| json!({ "state": state, "text": words::state(state) })),
+        "states": states.map(|state| json!({ "state": state, "text": base.words(words::state(state)) })),
         "properties": if is_simulated { json!(Properties::of(rig).described()) } else { json!([]) },
         "defects": defects
-            .map(|&kind| json!({ "name": kind.name(), "meaning": kind.meaning(), "group": group(kind), "must": must(kind) }))
+            .map(|&kind| json!({ "name": kind.name(), "meaning": base.words(kind.meaning()), "group": group(kind), "must": must(kind) }))
             .collect::<Vec<_>>(),
     })
 }

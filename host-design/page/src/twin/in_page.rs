@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use upright::table::Law;
 use upright_closed_loop::conversation::Monitor;
 use upright_closed_loop::harness::{HarnessError, endless_firmware};
-use upright_design::rig::{CartOnly, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 
 use super::connected::{ConnectedBoard, Exchange};
@@ -106,7 +106,6 @@ impl Twin {
         (upright, since_1970_s): (bool, f64),
     ) -> Result<Self, PageRefusal> {
         let rig = Rig::from_toml(toml, FILE.as_ref())?;
-        rig.needs_cart(CartOnly::Page, FILE.as_ref())?;
         let table = DeskDesign::design(&rig)?.with_own(&rig, own)?.table_with(&rig, motions)?;
         let law = table.laws.present().next().map_or(Law::Lqr, |(law, _)| law);
         let scenario = Scenario { sensing: Sensing::Encoders, ..Scenario::at_rest(&rig, law) };
@@ -117,7 +116,8 @@ impl Twin {
         };
         let epoch = Duration::try_from_secs_f64(since_1970_s).unwrap_or_default();
         let world = powered(machine, Properties::of(machine.rig), upright, epoch)?;
-        let console = Console::new(Monitor::with_telemetry_every(TELEMETRY_S, &machine.rig.name));
+        let monitor = Monitor::with_telemetry_every(TELEMETRY_S, &machine.rig.name);
+        let console = Console::new(monitor, machine.rig.base());
         Ok(Self { machine, epoch, console, world: TwinPower::On(world) })
     }
 
@@ -276,6 +276,33 @@ mod tests {
         assert_eq!(page.state_after(&defect("motor-reversed")), "Fault");
         page.run(&[json!({ "ask": "machine", "what": { "do": "restart", "upright": true } })]);
         assert_eq!(last_state(&page.run(&[])), "Balancing");
+    }
+
+    #[test]
+    fn an_arm_balances_and_is_told_and_pulled_in_its_own_units() {
+        for rig in ["single-qube-servo-2", "single-srv02-rotary", "double-quanser-rotary"] {
+            let mut page = Page::default();
+            let hello = page.start(rig, true);
+            let arc_m = hello["base"]["arc_m"].as_f64().unwrap();
+            assert_eq!((&hello["base"]["noun"], &hello["input"]), (&json!("arm"), &json!(["torque", "N·m"])));
+            assert_eq!((&hello["sensors"][0], &hello["push_unit"]), (&json!("arm"), &json!("N·m")));
+            let texts = |list: &str, name: &str| -> String {
+                hello[list].as_array().unwrap().iter().map(|told| told[name].to_string()).collect()
+            };
+            for (list, name) in [("properties", "label"), ("defects", "meaning"), ("states", "text")] {
+                let said = texts(list, name);
+                assert!(!said.contains("cart") && !said.contains("rail"), "{said}");
+            }
+            // Ten degrees beside it.
+            let pull = json!({ "do": "pull", "body": 0, "along": 0.0, "x": 0.17 * arc_m, "y": 0.0 });
+            assert_eq!(page.state_after(&pull), "Balancing", "{rig}");
+            let machine = page.run(&[])["picture"]["machine"].clone();
+            assert!(machine["state"][0].as_f64().unwrap().abs() > 0.005, "{rig}: {machine}");
+            assert_eq!(page.state_after(&defect("motor-reversed")), "Fault", "{rig}");
+        }
+        // Negative control: a cart.
+        let hello = Page::default().start("single-quanser-ip02", true);
+        assert_eq!((&hello["base"]["arc_m"], &hello["input"]), (&json!(1.0), &json!(["force", "N"])));
     }
 
     #[test]

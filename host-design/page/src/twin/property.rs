@@ -1,7 +1,8 @@
 //! What is true of the simulated machine but not known to the controller.
 
 use serde::Serialize;
-use upright_design::rig::{IMPERFECTIONS, Imperfection, Reality, Rig};
+use serde_json::{Value, json};
+use upright_design::rig::{Base, Imperfection, Reality, Rig};
 use upright_design::simulate::Disturbance;
 
 /// A property that can be changed while the rig runs.
@@ -22,6 +23,9 @@ pub(crate) struct Property {
     /// Whether it changes how the machine of a rig moves.
     #[serde(skip)]
     acts: fn(&Rig) -> bool,
+    /// Unit and range on an arm, if not the same.
+    #[serde(skip)]
+    on_arm: Option<(&'static str, [f64; 3])>,
 }
 
 /// What a property changes.
@@ -52,7 +56,11 @@ const fn property(
     changed: Changed,
     acts: fn(&Rig) -> bool,
 ) -> Property {
-    Property { name, label, unit, low, high, step, nominal: 0.0, changed, acts }
+    Property { name, label, unit, low, high, step, nominal: 0.0, changed, acts, on_arm: None }
+}
+
+const fn otherwise_on_arm(property: Property, unit: &'static str, range: [f64; 3]) -> Property {
+    Property { on_arm: Some((unit, range)), ..property }
 }
 
 /// The properties that are no rows of [`IMPERFECTIONS`].
@@ -89,15 +97,30 @@ const OTHERS: [Property; 9] = {
             always,
         ),
         property("air-drag", "air drag of each link", "mN·m·s²/rad² more", [0.0, 1.0, 0.001], drag, always),
-        property(
-            "cart-viscous",
-            "viscous friction of the cart",
-            "N·s/m more",
-            [0.0, 10.0, 0.1],
-            cart_viscous,
-            feels_forces,
+        otherwise_on_arm(
+            property(
+                "cart-viscous",
+                "viscous friction of the cart",
+                "N·s/m more",
+                [0.0, 10.0, 0.1],
+                cart_viscous,
+                feels_forces,
+            ),
+            "N·m·s/rad more",
+            [0.0, 0.02, 1e-4],
         ),
-        property(FORCE_NOISE, "force noise", "N rms", [0.0, 2.0, 0.01], Changed::Disturbance, feels_forces),
+        otherwise_on_arm(
+            property(
+                FORCE_NOISE,
+                "force noise",
+                "N rms",
+                [0.0, 2.0, 0.01],
+                Changed::Disturbance,
+                feels_forces,
+            ),
+            "N·m rms",
+            [0.0, 0.2, 1e-3],
+        ),
         property("jitter", "jitter of the tick", "% of a tick", [0.0, 40.0, 1.0], jitter, imposes_force),
         Property {
             nominal: 1.0,
@@ -129,6 +152,7 @@ fn of_imperfection(imperfection: &Imperfection, rig: &Rig) -> Option<Property> {
 /// The properties of a machine, and their current values.
 #[derive(Debug, Clone)]
 pub struct Properties {
+    base: Base,
     all: Vec<Property>,
     values: Vec<f64>,
 }
@@ -137,18 +161,31 @@ impl Properties {
     /// The properties of `rig` as designed for, with the disturbances that its file expects.
     pub fn of(rig: &Rig) -> Self {
         let others = OTHERS.into_iter().filter(|property| (property.acts)(rig));
-        let imperfections =
-            IMPERFECTIONS.iter().filter_map(|imperfection| of_imperfection(imperfection, rig));
+        let imperfections = Imperfection::of_base(rig.base())
+            .iter()
+            .filter_map(|imperfection| of_imperfection(imperfection, rig));
         let mut all: Vec<Property> = others.chain(imperfections).collect();
         for property in all.iter_mut().filter(|property| property.name == FORCE_NOISE) {
             property.nominal = Disturbance::of(rig).force_n;
         }
-        Self { values: all.iter().map(|property| property.nominal).collect(), all }
+        if !rig.base().is_cart() {
+            for property in &mut all {
+                if let Some((unit, [low, high, step])) = property.on_arm {
+                    *property = Property { unit, low, high, step, ..*property };
+                }
+            }
+        }
+        Self { base: rig.base(), values: all.iter().map(|property| property.nominal).collect(), all }
     }
 
     /// All properties, as the page is told.
-    pub(crate) fn described(&self) -> &[Property] {
-        &self.all
+    pub(crate) fn described(&self) -> Vec<Value> {
+        let told = |property: &Property| {
+            let mut told = json!(property);
+            told["label"] = json!(self.base.words(property.label));
+            told
+        };
+        self.all.iter().map(told).collect()
     }
 
     /// Sets a property, within its range. Returns whether the machine has to be built again; `None` if there is no
@@ -195,7 +232,7 @@ mod tests {
         let rigs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rigs");
         let rig = Rig::from_path(&rigs.join("quadruple-paper.toml")).unwrap();
         let mut number = 0;
-        for imperfection in IMPERFECTIONS {
+        for imperfection in Imperfection::of_base(rig.base()) {
             let Some(slider) = imperfection.slider else { continue };
             let mut properties = Properties::of(&rig);
             assert_eq!(properties.applied_to(&rig), rig, "negative control");
@@ -207,7 +244,7 @@ mod tests {
             // What is added is what a machine with this imperfection alone has.
             (imperfection.set)(&mut with.reality, 0.0);
             assert_eq!(with.reality, rig.reality, "{}", imperfection.key);
-            let same = properties.described().iter().filter(|property| property.name == slider.name);
+            let same = properties.described().into_iter().filter(|property| property["name"] == slider.name);
             assert_eq!(same.count(), 1, "{}", slider.name);
             number += 1;
         }

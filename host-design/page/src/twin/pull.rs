@@ -10,7 +10,7 @@ pub(crate) struct PulledPoint {
     pub(crate) body: usize,
     /// Where on the link: 0 at its joint, 1 at its end.
     pub(crate) along: f64,
-    /// Target position: along the rail and up from it (m).
+    /// Target position: along the rail, or along the arc of an arm's first joint, and up from it (m).
     pub(crate) to: [f64; 2],
 }
 
@@ -21,7 +21,10 @@ pub(crate) struct Spring {
     lengths_m: Vec<f64>,
     /// Distances of the links' planes from an arm's axis (m); 1 on a cart, whose position is a length.
     levers_m: Vec<f64>,
+    /// The distance of the plane that a page draws, on which the first joint moves; 1 on a cart.
+    drawn_m: f64,
     masses_kg: Vec<f64>,
+    /// What a pull at the cart moves, or at the end of an arm.
     total_kg: f64,
     gravity_m_per_s2: f64,
     period_s: f64,
@@ -55,7 +58,8 @@ impl Spring {
         Self {
             lengths_m: chain.links.iter().map(|link| link.length_m).collect(),
             levers_m: (0..chain.links.len()).map(|link| chain.radius_m(link).unwrap_or(1.0)).collect(),
-            total_kg: chain.total_mass_kg(),
+            drawn_m: chain.arc_m(),
+            total_kg: chain.total_mass_kg() / chain.arc_m().powi(2),
             masses_kg: chain.links.iter().map(|link| link.mass_kg).collect(),
             gravity_m_per_s2: chain.gravity_m_per_s2,
             period_s,
@@ -82,9 +86,9 @@ impl Spring {
             _ => 0.0,
         };
         let arms_m: Vec<f64> = (0..angles.len()).map(arm).collect();
-        let lever =
-            pulled.body.checked_sub(1).and_then(|link| self.levers_m.get(link)).copied().unwrap_or(1.0);
-        let (mut point, mut speed) = ([state[0] * lever, 0.0], [state[1] * lever, 0.0]);
+        let lever = pulled.body.checked_sub(1).and_then(|link| self.levers_m.get(link)).copied();
+        let lever = lever.unwrap_or(self.drawn_m);
+        let (mut point, mut speed) = ([state[0] * self.drawn_m, 0.0], [state[1] * lever, 0.0]);
         for (link, (&phi, &phidot)) in angles.iter().zip(&rates).enumerate() {
             let (sin, cos) = phi.sin_cos();
             let arm = arms_m[link];
@@ -135,6 +139,7 @@ mod tests {
         Spring {
             lengths_m: vec![0.5; links],
             levers_m: vec![1.0; links],
+            drawn_m: 1.0,
             masses_kg: vec![0.2; links],
             total_kg: 1.0,
             gravity_m_per_s2: 9.81,
@@ -174,6 +179,26 @@ mod tests {
         // A joint torque works on the relative rate.
         let joints = pull.cart_n * state[1] + pull.torques_n_m[0] * state[3] + pull.torques_n_m[1] * state[5];
         assert!((work - joints).abs() < 1e-5, "{work} {joints}");
+    }
+
+    #[test]
+    fn a_pull_at_an_arm_is_a_torque_about_its_axis() {
+        let rig = Rig::from_path(Path::new("../../rigs/single-qube-servo-2.toml")).unwrap();
+        let chain = rig.chain().unwrap();
+        let spring = Spring::of(chain, 2e-3);
+        let pulled = |body| PulledPoint { body, along: 0.0, to: [0.085 * 0.1 + 1e-3, 0.0] };
+        for body in [0, 1] {
+            let pull = spring.pull(&pulled(body), &[0.1, 0.0, 0.0, 0.0]);
+            assert!(pull.force_n[0] > 0.0, "{pull:?}");
+            assert!((pull.cart_n - 0.085 * pull.force_n[0]).abs() < 1e-12, "{pull:?}");
+        }
+        // What moves the whole arm moves its moment of inertia.
+        let force = spring.pull(&pulled(0), &[0.1, 0.0, 0.0, 0.0]).force_n[0];
+        let kg = (2.334e-4 + 0.024 * 0.085f64.powi(2)) / 0.085f64.powi(2);
+        assert!((force - kg * OMEGA * OMEGA * 1e-3).abs() < 1e-9, "{force}");
+        // Negative control: a pointer where the arm is pulls nothing.
+        let none = PulledPoint { to: [0.085 * 0.1, 0.0], ..pulled(0) };
+        assert!(spring.pull(&none, &[0.1, 0.0, 0.0, 0.0]).cart_n.abs() < 1e-12);
     }
 
     #[test]

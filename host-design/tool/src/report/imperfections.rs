@@ -2,6 +2,7 @@
 
 use super::ReportSource;
 use crate::figure::{Axis, Curve, Figure, Panel};
+use upright_design::rig::Base;
 use upright_trust::verify::{
     CornerSettings, Imperfections, LeftOut, Survival, VerifyError, corners, limit_cycle,
 };
@@ -30,16 +31,21 @@ pub(super) struct SurvivalRow {
     pub(super) off_moving_at: String,
     pub(super) typical: String,
     pub(super) source: &'static str,
-    pub(super) remedy: &'static str,
+    pub(super) remedy: String,
     pub(super) remarks: Vec<String>,
 }
 
 impl SurvivalTable {
-    pub(super) fn of(found: &Imperfections) -> Self {
-        let together = found.together.map(|all| all.text());
+    /// One for each law of the report.
+    pub(super) fn of_all(source: &ReportSource<'_>) -> Vec<Self> {
+        source.imperfections.iter().map(|found| Self::of(found, source.rig.base())).collect()
+    }
+
+    fn of(found: &Imperfections, base: Base) -> Self {
+        let together = found.together.map(|all| all.text(base));
         Self {
             law: found.law.title(),
-            rows: found.alone.iter().map(SurvivalRow::of).collect(),
+            rows: found.alone.iter().map(|survival| SurvivalRow::of(survival, base)).collect(),
             left_out: found.left_out.clone(),
             together,
         }
@@ -47,7 +53,7 @@ impl SurvivalTable {
 }
 
 impl SurvivalRow {
-    fn of(survival: &Survival) -> Self {
+    fn of(survival: &Survival, base: Base) -> Self {
         let one = survival.imperfection;
         let unit = one.unit;
         Self {
@@ -61,7 +67,7 @@ impl SurvivalRow {
             off_moving_at: format!("{} {unit}", survival.off_moving_text()),
             typical: format!("{} {unit}", one.typical_text()),
             source: one.source,
-            remedy: one.remedy,
+            remedy: base.words(one.remedy),
             remarks: survival.remarks(),
         }
     }

@@ -155,7 +155,7 @@ impl<'a> ReportPage<'a> {
             nyquist: Vec::new(),
             regions: Vec::new(),
             pushes: Vec::new(),
-            survivals: source.imperfections.iter().map(SurvivalTable::of).collect(),
+            survivals: SurvivalTable::of_all(source),
             imperfect: Vec::new(),
             trust: trust_rows(rig, trust),
             seed: source.seed,

@@ -4,11 +4,12 @@ use crate::figure::{COLOURS_CSS, style_sheet};
 use crate::twin::assets::{ASSETS, Asset};
 
 /// The modules of its script, each after those that it imports: first those that the desk has, too.
-const MODULES: [&str; 11] = [
+const MODULES: [&str; 12] = [
     "colours.js",
     "scale.js",
     "words.js",
     "guide.js",
+    "above.js",
     "rig.js",
     "link.js",
     "history.js",
@@ -17,7 +18,7 @@ const MODULES: [&str; 11] = [
     "drawers.js",
     "main.js",
 ];
-const SHARED: usize = 5;
+const SHARED: usize = 6;
 
 /// The twin's page in one document.
 pub(super) struct TwinPage {

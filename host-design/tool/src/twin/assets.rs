@@ -16,7 +16,7 @@ pub(crate) struct Asset {
 const SCRIPT: &str = "text/javascript";
 
 /// All files of the page.
-pub(crate) const ASSETS: [Asset; 14] = [
+pub(crate) const ASSETS: [Asset; 15] = [
     Asset { name: "", media_type: "text/html", content: include_str!("page/page.html") },
     Asset { name: "colours.css", media_type: "text/css", content: COLOURS_CSS },
     Asset { name: "page.css", media_type: "text/css", content: include_str!("page/page.css") },
@@ -27,6 +27,7 @@ pub(crate) const ASSETS: [Asset; 14] = [
     Asset { name: "link.js", media_type: SCRIPT, content: include_str!("page/link.js") },
     Asset { name: "guide.js", media_type: SCRIPT, content: include_str!("page/guide.js") },
     Asset { name: "history.js", media_type: SCRIPT, content: include_str!("page/history.js") },
+    Asset { name: "above.js", media_type: SCRIPT, content: include_str!("page/above.js") },
     Asset { name: "rig.js", media_type: SCRIPT, content: include_str!("page/rig.js") },
     Asset { name: "scope.js", media_type: SCRIPT, content: include_str!("page/scope.js") },
     Asset { name: "controls.js", media_type: SCRIPT, content: include_str!("page/controls.js") },

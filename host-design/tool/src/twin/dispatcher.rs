@@ -34,14 +34,14 @@ pub(super) struct Dispatcher {
 }
 
 impl Dispatcher {
-    /// A dispatcher with a new conversation.
+    /// A dispatcher of this conversation.
     pub(super) fn new(
-        monitor: Monitor,
+        console: Console,
         (viewers, events): (Connections, EventQueue),
         recording: SharedCsv,
     ) -> Self {
         Self {
-            console: Console::new(monitor),
+            console,
             viewers,
             events,
             commander: None,

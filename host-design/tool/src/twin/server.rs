@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use serde_json::Value;
 use upright_design::rig::Rig;
 use upright_design::table::TableValues;
-use upright_page::twin::{Properties, SimulatedMachine, TELEMETRY_S, greeting};
+use upright_page::twin::{Console, Properties, SimulatedMachine, TELEMETRY_S, greeting};
 
 use super::access::{Access, Admitted, accept, send};
 use super::connected;
@@ -73,7 +73,8 @@ impl Server {
             RunPlace::Board { .. } => Monitor::new(&rig.name),
             _ => Monitor::with_telemetry_every(TELEMETRY_S, &rig.name),
         };
-        let mut dispatcher = Dispatcher::new(monitor(), (viewers, events), self.recording);
+        let console = Console::new(monitor(), rig.base());
+        let mut dispatcher = Dispatcher::new(console, (viewers, events), self.recording);
         let mut properties = Properties::of(rig);
         let mut upright = upright;
         loop {
@@ -111,7 +112,8 @@ impl Server {
     ) -> Result<(), RunError> {
         let (viewers, events) = Connections::new(themed(greeting(rig, table, name, None)));
         let _accepting = accepting(self.listener, self.secret, viewers.clone(), Arc::clone(&self.recording))?;
-        let mut dispatcher = Dispatcher::new(Monitor::new(name), (viewers, events), self.recording);
+        let console = Console::new(Monitor::new(name), rig.base());
+        let mut dispatcher = Dispatcher::new(console, (viewers, events), self.recording);
         connected::run(line, &mut dispatcher, rig.into(), goes_on);
         Ok(())
     }

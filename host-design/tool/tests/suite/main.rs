@@ -57,6 +57,7 @@ mod stepper_command;
 mod stepper_on_board;
 mod transitions_command;
 mod twin_access;
+mod twin_arm;
 mod twin_guide;
 mod twin_page;
 mod twin_reload;

@@ -310,6 +310,6 @@ fn links_drive_and_sensors_are_chosen_by_their_pictures() {
     choose(&mut browser, links, 1);
     choose(&mut browser, drive, 3);
     until(&mut browser, "upright.desk.sketch.drive === 'stepper'");
-    assert!(comes_within(&mut browser, 20.0, "upright.live().hello.input[0] === 'Acceleration'"));
+    assert!(comes_within(&mut browser, 20.0, "upright.live().hello.input[0] === 'acceleration'"));
     assert_eq!(browser.errors(), Vec::<String>::new());
 }

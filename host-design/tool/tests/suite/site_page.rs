@@ -16,7 +16,7 @@ use crate::site_bits::is_wanted;
 use crate::twin_page::comes_within;
 
 /// Most bytes that a server sends for the page, compressed.
-const COMPRESSED: usize = 1_000_000;
+const COMPRESSED: usize = 1_050_000;
 pub(crate) const TELEPHONE: u32 = 390;
 
 pub(crate) fn root() -> std::path::PathBuf {

@@ -94,7 +94,7 @@ pub(crate) fn until_state(browser: &mut Browser, state: &str) {
 fn end_of(browser: &mut Browser, link: usize) -> [f64; 2] {
     let expression = format!(
         "(() => {{ const view = upright.view(); const box = view.canvas.getBoundingClientRect(); \
-         let [x, y, phi] = [view.state[0], 0, 0]; \
+         let [x, y, phi] = [view.arc * view.state[0], 0, 0]; \
          for (let k = 0; k < {link}; k += 1) {{ phi += view.state[2 + 2 * k]; \
          x -= view.hello.lengths_m[k] * Math.sin(phi); y += view.hello.lengths_m[k] * Math.cos(phi); }} \
          const [px, py] = view.toScreen([x, y]); \

@@ -11,7 +11,7 @@ use crate::twin_page::{Twin, until, until_state};
 fn guided(browser: &mut Browser, hello: &Value, latest: &Value, machine: &Value, wish: &Value) -> Value {
     browser.value(&format!(
         "import(new URL('guide.js', location.href)).then(({{ guide }}) => guide({{ \
-         hello: {{ is_simulated: true, has_swing_up: true, falls_when_held: false, ...{hello} }}, \
+         hello: {{ is_simulated: true, base: {{ noun: 'cart' }}, has_swing_up: true, falls_when_held: false, ...{hello} }}, \
          picture: {{ ended: null, commander: 1, fault: null, machine: {{ t_s: 1, pull: null, holding: 'free', ...{machine} }} }}, \
          latest: {{ against_arming: [], against_swing_up: [], now: null, ...{latest} }}, \
          wish: {{ name: null, left_s: 0, lapsed: null, ...{wish} }}, fall: null, step: 0, isCommander: true }}))"

@@ -18,7 +18,7 @@ use super::robust::{ToleranceKey, Tolerances};
 use crate::number::significant;
 
 /// One kind of imperfection.
-#[derive(Serialize)]
+#[derive(Clone, Copy, Serialize)]
 pub struct Imperfection {
     /// Its key in `[reality]` and in `[verify]`.
     pub key: &'static str,
@@ -50,6 +50,19 @@ pub struct Imperfection {
     /// The slider of the twin that adds to it.
     #[serde(skip)]
     pub slider: Option<Slider>,
+    /// What is otherwise on an arm, besides names and units.
+    #[serde(skip)]
+    pub(crate) on_arm: Option<ArmSizes>,
+}
+
+/// What an imperfection is on an arm.
+#[derive(Clone, Copy)]
+pub(crate) struct ArmSizes {
+    pub(crate) typical: [f64; 2],
+    pub(crate) source: &'static str,
+    pub(crate) remedy: &'static str,
+    /// Unit and range of the slider, if it has one.
+    pub(crate) slider: Option<(&'static str, [f64; 3])>,
 }
 
 /// The largest size that can be simulated.
@@ -181,6 +194,7 @@ const PLAIN: Imperfection = Imperfection {
     drives: SimulatedDrives::All,
     allowance: None,
     slider: None,
+    on_arm: None,
 };
 
 imperfections! {
@@ -216,6 +230,12 @@ imperfections! {
                 unit: "N more",
                 range: [0.0, 5.0, 0.05],
                 add: |reality, more| reality.friction.cart_friction_n += more,
+            }),
+            on_arm: Some(ArmSizes {
+                typical: [1e-3, 5e-2],
+                source: "estimate: no-load current times torque constant, of a small motor to one behind a gear",
+                remedy: "arm_n_m in [friction], rather too small than too large; a motor without a gear",
+                slider: Some(("N·m more", [0.0, 0.2, 1e-3])),
             }),
         };
     homing_error_rad: "rad", Rule::ANGLE, "error of each joint's zero", [1e-3, 1e-2],
@@ -261,12 +281,24 @@ imperfections! {
         "estimate: toothed belt under tension, to rack and pinion",
         "a tensioned belt instead of a rack; an encoder on the cart",
         |reality, size| reality.drive_train.backlash_m = size, {
+            on_arm: Some(ArmSizes {
+                typical: [5e-3, 3.5e-2],
+                source: "estimate: 0.3° of a planetary gear made for little play, to 2° of a spur gear",
+                remedy: "a motor without a gear, or a spring between two gears; an encoder on the arm",
+                slider: None,
+            }),
             drives: SimulatedDrives::OfForce("is not simulated between a stepper and its cart"),
         };
     belt_compliance_m_per_n: "m/N", Rule::POSITIVE, "stretch of belt or gear per force", [2e-6, 2e-5],
         "estimate: toothed belts 6 to 15 mm wide, a metre long",
         "a wider or shorter belt, or one with steel cords",
         |reality, size| reality.drive_train.belt_compliance_m_per_n = size, {
+            on_arm: Some(ArmSizes {
+                typical: [5e-3, 5e-2],
+                source: "50 mm of a steel shaft of 6 mm (G J / L), to a coupling with rubber (estimate)",
+                remedy: "a shorter or thicker shaft; a stiff coupling",
+                slider: None,
+            }),
             drives: SimulatedDrives::OfForce("is not simulated between a stepper and its cart"),
         };
     driver_lag_s: "s", Rule::POSITIVE,

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use upright::table::Law;
-use upright_design::rig::{CartOnly, Rig};
+use upright_design::rig::Rig;
 use upright_design::simulate::{Scenario, Sensing};
 use upright_design::table::TableValues;
 use upright_tool::in_the_loop::RunPlace;
@@ -28,7 +28,7 @@ use upright_command::Failure;
 Examples:
   upright twin rigs/single-quanser-ip02.toml                  the firmware on this computer, the rig simulated
   upright twin rigs/quadruple-paper.toml                      four links: they stand a short tug only
-  upright twin rigs/quadruple-paper.toml --target board       the image that is flashed
+  upright twin rigs/double-quanser-rotary.toml                an arm, from the side and from above
   upright twin rigs/quadruple-paper.toml --target board       the image that is flashed, on the virtual board
   upright twin rigs/single-quanser-ip02.toml --hanging        from power-up on, with every step left to you
   upright twin rigs/quadruple-paper.toml --port /dev/ttyACM0  a real board, without what only a simulation can do
@@ -62,7 +62,6 @@ pub(crate) struct TwinCommand {
 impl TwinCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let (rig, _, table) = self.variation.designed()?;
-        rig.needs_cart(CartOnly::Page, &self.variation.rig)?;
         let table =
             with_stored_motions(&self.variation.rig, &rig, table, Wanted::from_option(self.transitions))?;
         let built = match self.port {

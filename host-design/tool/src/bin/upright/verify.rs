@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use upright::table::Law;
-use upright_design::rig::{CartOnly, Imperfection, Rig};
+use upright_design::rig::{Imperfection, Rig};
 use upright_design::simulate::simulate;
 use upright_design::study::Study;
 use upright_design::table::{TableValues, write_atomically};
@@ -137,7 +137,6 @@ impl VerifyCommand {
             return self.map(&rig, &table, path);
         }
         if self.imperfections {
-            rig.needs_cart(CartOnly::Imperfections, &self.variation.rig)?;
             return self.imperfections(&rig, &table);
         }
         let law = self.law.map(Law::key);
@@ -177,7 +176,9 @@ impl VerifyCommand {
 
     fn imperfections(&self, rig: &Rig, table: &TableValues) -> Result<(), Failure> {
         let found = search(rig, table)?;
-        let text = || found.iter().map(imperfections::table).collect::<Vec<_>>().join("\n");
+        let text = || {
+            found.iter().map(|found| imperfections::table(found, rig.base())).collect::<Vec<_>>().join("\n")
+        };
         print(self.json, &found, text)
     }
 

@@ -61,8 +61,8 @@ class Snapshots {
     const { kept, now, at } = this;
     if (kept === null || kept.rows === null || now.rows === null || kept.lengths.length === 0 || now.lengths.length === 0) return;
     const state = ({ rows }) => rows[Math.min(rows.length - 1, Math.round((at / rows.at(-1)[0]) * (rows.length - 1)))][3];
-    const ends = [0, 1].map((end) => [kept, now].map(({ travel }) => travel[end] ?? (end === 0 ? -1 : 1)));
-    drawTogether(byId('together'), [kept, now].map((one) => ({ lengths: one.lengths, state: state(one) })), [Math.min(...ends[0]), Math.max(...ends[1])]);
+    const ends = [0, 1].map((end) => [kept, now].map(({ travel, arc }) => arc * (travel[end] ?? (end === 0 ? -1 : 1))));
+    drawTogether(byId('together'), [kept, now].map((one) => ({ points: joints(one.lengths, state(one), one.arc) })), [Math.min(...ends[0]), Math.max(...ends[1])]);
     byId('replay-at').textContent = `${at.toFixed(1)} s`;
   }
 

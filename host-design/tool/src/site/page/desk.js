@@ -96,7 +96,7 @@ function sketched(answer) {
   desk.sketch = answer;
   if (examples.some(({ name }) => name === answer.rig)) byId('example').value = answer.rig;
   form.show(answer.fields);
-  weights.show(answer.weights);
+  weights.show(answer.weights, answer.base);
   dials.show(answer.dials, answer.rig, answer.lengths_m.length);
   machine.show(answer);
   live.rest(answer);
@@ -203,10 +203,11 @@ function showLoop() {
   byId('figures').textContent = run === null ? '' : said.split('\n').map((line) => line.trim()).join('; ');
   for (const id of ['plots', 'figures']) byId(id).classList.remove('old');
   if (run === null) return byId('plots').replaceChildren();
+  const { noun, position: [name, unit] } = desk.sketch.base;
   const links = desk.sketch.lengths_m.length;
   const state = (index, factor = 1) => (row) => factor * row[3][index];
   const plots = [
-    ['position (m)', [{ name: 'cart', value: state(0), colour: curveColour(0) }, { name: 'set-point', value: (row) => row[1], colour: 'var(--limit)' }]],
+    [`${name} (${unit})`, [{ name: noun, value: state(0), colour: curveColour(0) }, { name: 'set-point', value: (row) => row[1], colour: 'var(--limit)' }]],
     ['angles (°)', desk.sketch.lengths_m.map((_, link) => ({ name: `link ${link + 1}`, value: state(2 + 2 * link, DEGREES), state: 2 + 2 * link, colour: curveColour(link) }))],
     [desk.sketch.input, [{ name: 'applied', value: (row) => row[2], colour: curveColour(1) }]],
   ].filter(([, curves]) => links > 0 || curves[0]?.name === 'applied');
@@ -229,7 +230,7 @@ function showLoop() {
 // What is kept of the loop as it is now, to be compared with another one.
 function snapshot() {
   const law = chosen();
-  return { name: `${desk.sketch.rig}, ${desk.own === null ? law?.title ?? 'no law' : 'your K'}`, lengths: desk.sketch.lengths_m, travel: desk.sketch.travel_m, rows: law?.run?.rows ?? null,
+  return { name: `${desk.sketch.rig}, ${desk.own === null ? law?.title ?? 'no law' : 'your K'}`, lengths: desk.sketch.lengths_m, arc: desk.sketch.base.arc_m, travel: desk.sketch.travel_m, rows: law?.run?.rows ?? null,
     abilities: abilities({ survival: desk.survival ?? {}, law }) };
 }
 
@@ -377,9 +378,9 @@ function listen() {
     replace(examples.find(({ name }) => name === target.value).toml, target.value);
   });
   listenToFiles();
-  for (const [id, unit] of [['lean', '°'], ['step', 'm']]) {
+  for (const [id, unit] of [['lean', () => '°'], ['step', () => desk.sketch?.base.position[1] ?? 'm']]) {
     const show = () => {
-      const said = `${byId(id).value} ${unit}`;
+      const said = `${byId(id).value} ${unit()}`;
       byId(`${id}-value`).textContent = said;
       byId(id).setAttribute('aria-valuetext', said);
     };

@@ -53,26 +53,20 @@ function drawCurves(place, curves, rows, kept = []) {
   return x;
 }
 
-// Two rigs at the same time of their runs, each { lengths, state }; the first one is only outlined.
+// Two rigs at the same time of their runs, each with the points of its joints; the first one is only outlined.
 function drawTogether(place, rigs, [low, high]) {
   const { width, height } = place.getBoundingClientRect();
   if (width === 0) return undefined; // not shown
   place.setAttribute('viewBox', `0 0 ${width} ${height}`);
-  const reach = Math.max(...rigs.map(({ lengths }) => lengths.reduce((sum, length) => sum + length, 0)));
+  const reach = Math.max(...rigs.map(({ points }) => points.reduce((sum, [x, y], joint) => sum + (joint === 0 ? 0 : Math.hypot(x - points[joint - 1][0], y - points[joint - 1][1])), 0)));
   const [x0, y0] = [width / 2, height - 16];
   const scale = Math.min((0.9 * y0) / reach, (0.46 * width) / Math.max(-low, high));
   const at = (x, y) => [x0 + scale * x, y0 - scale * y].map((value) => value.toFixed(1)).join(',');
   const parts = [svg('line', { x1: x0 + scale * low, x2: x0 + scale * high, y1: y0, y2: y0, stroke: 'var(--rule)', 'stroke-width': 4 })];
-  rigs.forEach(({ lengths, state }, number) => {
+  rigs.forEach(({ points: joined }, number) => {
     const style = number === 0 ? { stroke: 'var(--muted)', 'stroke-width': 3, 'stroke-dasharray': '5 4' } : { stroke: 'var(--c0)', 'stroke-width': 5 };
-    let [x, y, angle] = [state[0], 0, 0];
-    const points = [at(x, y)];
-    lengths.forEach((length, link) => {
-      angle += state[2 + 2 * link];
-      [x, y] = [x - length * Math.sin(angle), y + length * Math.cos(angle)];
-      points.push(at(x, y));
-    });
-    parts.push(svg('rect', { x: x0 + scale * state[0] - 16, y: y0 - 7, width: 32, height: 14, fill: number === 0 ? 'none' : 'var(--reference)', stroke: style.stroke }));
+    const points = joined.map((point) => at(...point));
+    parts.push(svg('rect', { x: x0 + scale * joined[0][0] - 16, y: y0 - 7, width: 32, height: 14, fill: number === 0 ? 'none' : 'var(--reference)', stroke: style.stroke }));
     parts.push(svg('polyline', { points: points.join(' '), fill: 'none', 'stroke-linejoin': 'round', ...style }));
   });
   place.replaceChildren(...parts);

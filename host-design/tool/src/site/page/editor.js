@@ -155,20 +155,21 @@ class Form {
 class Weights {
   constructor(set) {
     this.set = set;
-    this.count = null;
+    this.shown = null;
   }
 
-  show(weights) {
+  show(weights, { noun }) {
     const place = byId('weights');
     if (weights === null) {
-      this.count = null;
+      this.shown = null;
       place.replaceChildren();
       return;
     }
-    const all = [...weights.states.map((value, state) => ({ key: `lqr.state_weights[${state + 1}]`, value, label: stateName(state) })),
+    const all = [...weights.states.map((value, state) => ({ key: `lqr.state_weights[${state + 1}]`, value, label: stateName(state, noun) })),
       { key: 'lqr.force_weight', value: weights.force, label: 'weight of the input' }];
-    if (all.length !== this.count) {
-      this.count = all.length;
+    const shown = `${all.length} ${noun}`;
+    if (shown !== this.shown) {
+      this.shown = shown;
       place.replaceChildren(element('h3', { textContent: 'Weights of the LQR' }), ...all.map((weight) => this.slider(weight)));
     }
     for (const { key, value } of all) {
@@ -201,8 +202,8 @@ class Weights {
 }
 
 // Name of a state of a chain.
-function stateName(state) {
+function stateName(state, noun) {
   const link = Math.floor(state / 2);
-  if (link === 0) return ['position of the cart', 'speed of the cart'][state];
+  if (link === 0) return [`position of the ${noun}`, `speed of the ${noun}`][state];
   return state % 2 === 0 ? `angle of link ${link}` : `rate of link ${link}`;
 }

@@ -38,14 +38,14 @@ class Live {
   machine(what) { this.port?.postMessage({ ask: 'machine', what }); }
 
   // Draws a rig at rest that does not move yet.
-  rest({ lengths_m: lengths, travel_m: travel }) {
+  rest({ base, lengths_m: lengths, travel_m: travel }) {
     if (lengths.length === 0) {
       this.stop();
       byId('rig').width = 0;
       byId('motor').textContent = '';
       byId('stage').dataset.motor = 'off';
     } else if (this.thread !== null) return;
-    this.meet({ lengths_m: lengths, travel_m: travel, soft_m: travel, angle_limit_rad: Math.PI, force_limit_n: 1, is_simulated: true, setpoints_m: [0, 0] });
+    this.meet({ base, lengths_m: lengths, travel_m: travel, soft_m: travel, angle_limit_rad: Math.PI, force_limit_n: 1, is_simulated: true, setpoints_m: [0, 0] });
   }
 
   meet(hello) {
@@ -155,12 +155,12 @@ class Live {
     this.toldAt = now;
     const state = isDown ? 'fault' : isOn(latest) ? 'on' : 'off';
     byId('stage').dataset.motor = state;
-    byId('motor').textContent = { fault: '✕ Motor off', off: '○ Motor off' }[state] ?? `⚡ ${Math.abs(latest.applied_n).toFixed(1)} ${hello.input[1]}`;
+    byId('motor').textContent = { fault: '✕ Motor off', off: '○ Motor off' }[state] ?? `⚡ ${Math.abs(latest.applied_n).toFixed(hello.force_limit_n < 5 ? 3 : 1)} ${hello.input[1]}`;
     const { line, below } = guide({ hello, picture, latest, wish: { name: null, left_s: 0, lapsed: null }, fall: this.witness.fall, step: 4, isCommander: true });
     const isPulled = picture.machine?.pull && this.nudge === null;
     if (isDown) this.say(`${line}.`, true);
     else if (isPulled) this.say(`${line}. ${below}`, false);
-    else this.say(hello.falls_when_held ? 'Pull the cart, or give a link a short tug.' : 'Pull it, with the finger or the mouse.', false);
+    else this.say(hello.falls_when_held ? `Pull the ${hello.base.noun}, or give a link a short tug.` : 'Pull it, with the finger or the mouse.', false);
   }
 
   // Nudges it now and then, so that one sees what it does; not where the person prefers less motion.
@@ -179,7 +179,7 @@ class Live {
     this.nudges += 1;
     this.side = -this.side;
     const body = this.hello.falls_when_held ? 0 : this.hello.lengths_m.length;
-    const [x, y] = joints(this.hello.lengths_m, this.picture.machine.state)[body];
+    const [x, y] = joints(this.hello.lengths_m, this.picture.machine.state, this.hello.base.arc_m)[body];
     this.machine({ do: 'pull', body, along: 1, x: x + this.side * NUDGE_SIZE[body === 0 ? 1 : 0] * this.view.reach, y });
   }
 

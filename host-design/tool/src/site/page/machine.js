@@ -5,37 +5,46 @@ const MOTOR_KEYS = ['torque_constant_n_m_per_a', 'back_emf_constant_v_s_per_rad'
   'supply_v', 'bridge_drop_v', 'dead_zone_v', 'slew_v_per_s'];
 const STEPPER_KEYS = ['acceleration_limit_m_per_s2', 'step_m', 'speed_limit_m_per_s', 'step_rate_limit_hz', 'bandwidth_hz'];
 const SENSOR_KEYS = ['encoder_step_rad', 'encoder_counts_per_rev', 'sensor_bits', 'sensor_travel_rad', 'sensor_zero_counts', 'sensor_noise_rad'];
-// What a drive begins with where the file says nothing: a force limit (N), an encoder of the cart (m), its mass (kg).
-const BEGIN = { force_n: 20, encoder_m: 2.5e-5, mass_kg: 1, force_weight: 0.1, acceleration_weight: 1, force_noise: 2e-4, acceleration_noise: 5e-4 };
-// A motor that reaches twice the force limit with 24 V when it stands, over a pulley of 10 mm.
-const MOTOR = { torque_constant_n_m_per_a: 0.03, pulley_radius_m: 0.01, supply_v: 24 };
+// What a drive begins with where the file says nothing, on each base: a force limit, an encoder, the base's mass, a
+// stepper's limits and travel per pulse, and the motor's pulley, which an arm does not have.
+const BEGIN = {
+  cart: { force_n: 20, encoder_m: 2.5e-5, mass_kg: 1, force_weight: 0.1, acceleration_weight: 1, force_noise: 2e-4, acceleration_noise: 5e-4,
+    acceleration: 20, step: 5e-5, speed: 1.5, pulley: { pulley_radius_m: 0.01 } },
+  arm: { force_n: 0.5, encoder_m: 1.5e-3, mass_kg: 2e-3, force_weight: 50, acceleration_weight: 0.02, force_noise: 1e-6, acceleration_noise: 0.01,
+    acceleration: 150, step: 1.9635e-3, speed: 15, pulley: {} },
+};
+// A motor that reaches twice the force limit with 24 V when it stands.
+const MOTOR = { torque_constant_n_m_per_a: 0.03, supply_v: 24 };
 
 const without = (section, names) => names.map((name) => [`${section}.${name}`, null]);
 
-// The values of keys with which the rig gets another drive; `is` says what its file has.
+// The values of keys with which the rig gets another drive; `is` says what its file has. Keys are those of a cart: an arm's
+// file is written with its own.
 function driveOf(kind, is) {
-  const field = (key, otherwise) => is.fields.find((one) => one.key === key)?.value ?? otherwise;
-  const force = field('actuator.force_limit_n', BEGIN.force_n);
+  const field = (key, otherwise) => is.fields.find((one) => one.on_cart === key)?.value ?? otherwise;
+  const force = field('actuator.force_limit_n', begin.force_n);
   const isStepper = kind === 'stepper';
+  const begin = BEGIN[is.base.noun];
   const values = [...without('actuator', ['kind', ...MOTOR_KEYS, ...STEPPER_KEYS])];
   if (isStepper) {
-    values.push(...without('actuator', ['force_limit_n', 'driver_lag_s']), ['cart.encoder_step_m', null], ['tick.delay_ticks', null], ['limits.jog_force_n', null],
-      ['actuator.kind', '"acceleration"'], ['actuator.acceleration_limit_m_per_s2', '20'], ['actuator.step_m', '5e-5'], ['actuator.speed_limit_m_per_s', '1.5']);
+    values.push(...without('actuator', ['force_limit_n', 'driver_lag_s']), ['cart.encoder_step_m', null], ['cart.encoder_counts_per_rev', null], ['tick.delay_ticks', null], ['limits.jog_force_n', null],
+      ['actuator.kind', '"acceleration"'], ['actuator.acceleration_limit_m_per_s2', String(begin.acceleration)],
+      ['actuator.step_m', String(begin.step)], ['actuator.speed_limit_m_per_s', String(begin.speed)]);
   } else {
-    values.push(['actuator.force_limit_n', String(force)], ['cart.mass_kg', String(field('cart.mass_kg', BEGIN.mass_kg))],
-      ['cart.encoder_step_m', String(field('cart.encoder_step_m', BEGIN.encoder_m))]);
+    values.push(['actuator.force_limit_n', String(force)], ['cart.mass_kg', String(field('cart.mass_kg', begin.mass_kg))]);
+    if (field('cart.encoder_counts_per_rev', null) === null) values.push(['cart.encoder_step_m', String(field('cart.encoder_step_m', begin.encoder_m))]);
   }
   if (kind === 'motor') {
-    const ohm = (MOTOR.torque_constant_n_m_per_a * MOTOR.supply_v) / (2 * force * MOTOR.pulley_radius_m);
-    values.push(...Object.entries({ ...MOTOR, resistance_ohm: Number(ohm.toPrecision(3)) }).map(([name, value]) => [`actuator.${name}`, String(value)]));
+    const ohm = (MOTOR.torque_constant_n_m_per_a * MOTOR.supply_v) / (2 * force * (begin.pulley.pulley_radius_m ?? 1));
+    values.push(...Object.entries({ ...MOTOR, ...begin.pulley, resistance_ohm: Number(ohm.toPrecision(3)) }).map(([name, value]) => [`actuator.${name}`, String(value)]));
   }
   // Weight and noise are those of the input.
   const [from, to] = isStepper ? ['force', 'acceleration'] : ['acceleration', 'force'];
   if (isStepper !== (is.drive === 'stepper')) {
-    if (is.weights !== null) values.push([`lqr.${from}_weight`, null], [`lqr.${to}_weight`, String(BEGIN[`${to}_weight`])]);
+    if (is.weights !== null) values.push([`lqr.${from}_weight`, null], [`lqr.${to}_weight`, String(begin[`${to}_weight`])]);
     if (is.has_observer) {
       const unit = { force: 'n2_s', acceleration: 'm2_per_s3' };
-      values.push([`kalman.${from}_noise_${unit[from]}`, null], [`kalman.${to}_noise_${unit[to]}`, String(BEGIN[`${to}_noise`])]);
+      values.push([`kalman.${from}_noise_${unit[from]}`, null], [`kalman.${to}_noise_${unit[to]}`, String(begin[`${to}_noise`])]);
     }
   }
   return values;
@@ -89,6 +98,6 @@ class MachinePictures {
       act: () => { if (sketch.drive !== kind) this.set(driveOf(kind, sketch), text, refuse); } }));
     const sensors = [['encoder', 'encoders'], ['absolute', 'magnetic']].map(([kind, text]) => ({ text, drawn: PICTURES[kind](), is: sketch.sensors === kind,
       act: () => { if (sketch.sensors !== kind) this.set(sensorsOf(kind, sketch), text, refuse); } }));
-    return byId('pictures').replaceChildren(...group('Links', links), ...group('Drive of the cart', drives), ...group('Sensors of the links', sensors), refused);
+    return byId('pictures').replaceChildren(...group('Links', links), ...group(`Drive of the ${sketch.base.noun}`, drives), ...group('Sensors of the links', sensors), refused);
   }
 }

@@ -27,7 +27,7 @@ class Imperfections {
   }
 
   show(properties) {
-    const names = properties.map(({ name }) => name).join();
+    const names = properties.map(({ name, unit }) => `${name} ${unit}`).join();
     if (names === this.names) return;
     this.names = names;
     this.live.values.clear();

@@ -146,6 +146,10 @@ export class Controls {
 
   hello(hello, scopes) {
     this.scopes = scopes;
+    this.told = hello;
+    const { noun, position: [, unit] } = hello.base;
+    for (const element of document.querySelectorAll('[title*="cart"]')) element.title = element.title.replace('cart', noun);
+    byId('setpoint').setAttribute('aria-label', `set-point (${unit})`);
     document.title = `${hello.rig}: twin`;
     byId('name').textContent = hello.rig;
     byId('place').textContent = `${hello.is_simulated ? 'simulated rig, real firmware' : 'firmware'}: ${hello.place}`;
@@ -216,7 +220,7 @@ export class Controls {
     const law = this.laws.find(({ value }) => value === latest.law);
     if (law !== undefined && document.activeElement !== byId('law')) byId('law').value = law.name;
     const setpoint = wanted ?? latest.setpoint_m;
-    write(byId('setpoint-value'), `${setpoint.toFixed(3)} m`);
+    write(byId('setpoint-value'), `${setpoint.toFixed(3)} ${this.told.base.position[1]}`);
     if (document.activeElement !== byId('setpoint')) byId('setpoint').value = setpoint;
   }
 
@@ -234,7 +238,7 @@ export class Controls {
     };
     if (fault === null) return place.replaceChildren();
     const why = fall?.defect ? `Broken on purpose: ${fall.defect.replaceAll('-', ' ')}. `
-      : fall?.pull ? `You pulled ${bodyName(fall.pull.body)} with up to ${newtons(fall.pull.n)}. ` : '';
+      : fall?.pull ? `You pulled ${bodyName(fall.pull.body, this.told)} with up to ${newtons(fall.pull.n)}. ` : '';
     const since = this.isSimulated ? 'It falls freely. Dashed: where the motor went off. Nothing is estimated any more; dotted curves are the true motion.'
       : 'Nothing is estimated any more; dotted curves are what the encoders say, if they can still be trusted.';
     const code = Object.assign(document.createElement('small'), { textContent: `Fault ${text}` });
@@ -252,7 +256,10 @@ export class Controls {
     }
     const { challenge } = machine;
     byId('challenge').setAttribute('aria-pressed', challenge !== null);
-    write(byId('score'), challenge === null ? '' : `upright for ${challenge.upright_s.toFixed(0)} s, hardest push survived ${challenge.survived_n.toFixed(1)} N${
-      challenge.is_over ? '; it fell' : `, push of ${Math.abs(challenge.push_n).toFixed(1)} N`}`);
+    write(byId('score'), challenge === null ? '' : `upright for ${challenge.upright_s.toFixed(0)} s, hardest push survived ${this.pushed(challenge.survived_n)}${
+      challenge.is_over ? '; it fell' : `, push of ${this.pushed(Math.abs(challenge.push_n))}`}`);
   }
+
+  // A push of the challenge, in the unit of what pushes.
+  pushed(size) { return `${size.toFixed(size > 0 && size < 1 ? 3 : 1)} ${this.told.push_unit}`; }
 }

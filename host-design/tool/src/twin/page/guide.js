@@ -1,6 +1,6 @@
 // What the rig waits for, in one line, and the one act that goes on from there.
 
-import { plain } from './words.js';
+import { capital, plain } from './words.js';
 
 export const STEPS = ['Home', 'Check signs', 'Jog', 'Raise', 'Balance'];
 
@@ -12,7 +12,6 @@ const RECENT_S = 1.5;
 const say = (line) => ({ ask: 'say', line });
 const machine = (what) => ({ ask: 'machine', what });
 const hand = (how) => machine({ do: 'hold', how });
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const begins = (list, text) => list.some((entry) => entry.startsWith(text));
 const reason = (text) => plain(capital(text.replace(/^a link is not upright: /, '')));
 
@@ -79,7 +78,7 @@ export class Witness {
 }
 
 export const newtons = (n) => `${n.toFixed(n < 1 ? 2 : 1)} N`;
-export const bodyName = (body) => (body === 0 ? 'the cart' : `link ${body}`);
+export const bodyName = (body, { base }) => (body === 0 ? `the ${base.noun}` : `link ${body}`);
 
 const raise = { text: 'Raise', key: 'w', wish: 'up' };
 const stillAndRaise = { ...raise, text: 'Still and raise', asks: [say('still')] };
@@ -99,7 +98,7 @@ function calibrated({ hello, latest, machine: told, wish }) {
   }
   if (begins(against, "the motor's sign")) {
     return { step: 2, line: 'The encoders count the right way', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' },
-      below: now === null ? 'Hands off: while you hold the button, the motor pushes the cart by some mm, to learn its own sense.' : capital(now) };
+      below: now === null ? `Hands off: while you hold the button, the motor pushes the ${hello.base.noun} a little, to learn its own sense.` : capital(now) };
   }
   const still = hello.is_simulated && told?.holding !== 'hanging' ? { text: 'Hold it still', key: 'j', asks: [hand('hanging')] } : undefined;
   if (wish.name === 'up') {
@@ -125,14 +124,14 @@ function calibrated({ hello, latest, machine: told, wish }) {
 
 function balancing({ hello, machine: told }) {
   if (told?.pull) {
-    return { step: 4, line: `You pull ${bodyName(told.pull.body)} with ${newtons(Math.hypot(...told.pull.force_n))}`,
+    return { step: 4, line: `You pull ${bodyName(told.pull.body, hello)} with ${newtons(Math.hypot(...told.pull.force_n))}`,
       below: hello.falls_when_held && told.pull.body > 0 ? 'Let go at once: a pull that is held fells it.' : 'Let go, and watch it come back.' };
   }
   if (told?.holding === 'upright') return { step: 4, line: 'Balancing, and the hand still holds it', below: '', act: { text: 'Let go', key: 'f', asks: [hand('free')] } };
   return { step: 4, line: 'Balancing', isDone: true,
     below: !hello.is_simulated ? 'Move the set-point, or push it gently.'
-      : hello.falls_when_held ? 'Pull the cart, drag the ◆, or break something. A link stands a short tug only: a pull that is held fells it, however weak.'
-        : 'Pull it, drag the ◆ on the rail, or break something.',
+      : hello.falls_when_held ? `Pull the ${hello.base.noun}, drag the ◆, or break something. A link stands a short tug only: a pull that is held fells it, however weak.`
+        : 'Pull it, drag the ◆, or break something.',
     act: hello.has_swing_up ? { text: 'Lower', key: 's', asks: [say('down')] } : undefined };
 }
 
@@ -161,7 +160,7 @@ const BY_STATE = {
     act: { text: 'Home', key: 'h', asks: [...(hello.is_simulated ? [hand('hanging')] : []), say('home')] } }),
   Homing: ({ latest }) => ({ step: 0, line: 'Homing', below: capital(latest.now ?? '') }),
   Calibrated: calibrated,
-  Jogging: () => ({ step: 2, line: 'The motor pushes the cart', below: 'Hold the button until it has learnt its sense.', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' } }),
+  Jogging: ({ hello }) => ({ step: 2, line: `The motor pushes the ${hello.base.noun}`, below: 'Hold the button until it has learnt its sense.', act: { text: 'Hold to jog', key: 'm', held: 'jog +x' } }),
   Identifying: () => ({ step: 2, line: 'The motor shakes the links' }),
   Armed: ({ hello, latest, machine: told, wish }) => ({ step: 3, line: 'Armed: waits until all links are upright and still', below: reason(latest.against_arming[0] ?? ''),
     act: hello.is_simulated && wish.name !== 'arm' && told?.holding !== 'upright' ? lift(hello) : undefined }),

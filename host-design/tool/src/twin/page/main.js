@@ -90,7 +90,7 @@ function motor(latest, force) {
   else if (performance.now() - seen.since < MOTOR_MS) return;
   seen.since = performance.now();
   byId('motor').textContent = { fault: '✕ Motor off: fault', off: '○ Motor off' }[state]
-    ?? `⚡ Motor on ${Math.abs(force).toFixed(1)} ${hello.input[1]}`;
+    ?? `⚡ Motor on ${Math.abs(force).toFixed(hello.force_limit_n < 5 ? 3 : 1)} ${hello.input[1]}`;
 }
 
 function frame() {

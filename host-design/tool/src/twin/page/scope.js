@@ -5,6 +5,7 @@ import { isEstimated, isHomed, isOn } from './guide.js';
 import { CAPACITY, ESTIMATED, History, UNKNOWN } from './history.js';
 import { context } from './rig.js';
 import { niceStep, roundValues, turnsOf, within } from './scale.js';
+import { capital } from './words.js';
 
 const LONGEST_S = 60;
 const SHORTEST_S = 0.2;
@@ -16,6 +17,8 @@ const AXIS_PX = 18;
 // The scopes: curves, each with its name, its value in a telemetry message, and its limit, beside the smallest range
 // that is shown and what is said where there is no value.
 function panels(hello) {
+  const { noun, position: [name, unit], force: [, force] } = hello.base;
+  const [input, inputUnit] = hello.input;
   const joints = hello.sensors.map((name, sensor) => ({ name, sensor })).slice(1);
   const each = (value) => joints.map(({ name, sensor }) => ({ name, value: (t) => value(t, sensor), ink: `--c${(sensor - 1) % 6}` }));
   const estimate = (index, factor = 1) => (t) => (isEstimated(t) ? t.estimate[index] * factor : NaN);
@@ -23,12 +26,13 @@ function panels(hello) {
   return [
     { title: 'Angle', unit: '°', least: 0.5, turn: 360, without: 'no estimate', limits: [1, -1].map((side) => side * hello.angle_limit_rad * DEGREES),
       curves: joints.map(({ name, sensor }) => ({ name, value: estimate(2 * sensor, DEGREES), seen: (state) => state[2 * sensor] * DEGREES, ink: `--c${(sensor - 1) % 6}` })) },
-    { title: 'Position', unit: 'm', least: 0.01, without: 'no estimate', limits: hello.soft_m, curves: [
-      { name: 'cart', value: estimate(0), seen: (state) => state[0], ink: '--ink' }, { name: 'set-point', value: (t) => t.setpoint_m, ink: '--link' }] },
-    { title: hello.input[0], unit: hello.input[1], least: 0.2, without: 'motor off', limits: [hello.force_limit_n, -hello.force_limit_n], curves: [
+    { title: capital(name), unit, least: 0.01, without: 'no estimate', limits: hello.soft_m, curves: [
+      { name: noun, value: estimate(0), seen: (state) => state[0], ink: '--ink' }, { name: 'set-point', value: (t) => t.setpoint_m, ink: '--link' }] },
+    // A force says little while nothing happens.
+    { title: capital(input), unit: inputUnit, isLate: inputUnit === force, least: Math.min(0.2, 0.1 * hello.force_limit_n), without: 'motor off', limits: [hello.force_limit_n, -hello.force_limit_n], curves: [
       { name: 'requested', value: motor('requested_n'), ink: '--c1' }, { name: 'applied', value: motor('applied_n'), ink: '--ink' }] },
     { title: 'Rate', unit: '°/s', least: 10, without: 'no estimate', curves: each((t, sensor) => estimate(2 * sensor + 1, DEGREES)(t)) },
-    { title: 'Surprise', unit: 'mm, mrad', least: 0.1, without: 'no prediction', curves: hello.sensors.map((name, sensor) => (
+    { title: 'Surprise', unit: [...new Set([`m${unit}`, 'mrad'])].join(', '), least: 0.1, without: 'no prediction', curves: hello.sensors.map((name, sensor) => (
       { name, value: (t) => (isEstimated(t) ? t.innovation[sensor] * 1e3 : NaN), ink: sensor === 0 ? '--ink' : `--c${(sensor - 1) % 6}` })) },
     { title: 'Tick', unit: 'processor cycles', least: 10, curves: [
       { name: 'cycles', value: (t) => t.cycles, ink: '--ink' }, { name: 'worst', value: (t) => t.worst_cycles, ink: '--c1' }] },
@@ -103,7 +107,7 @@ export class Scopes {
       if (event.key === '-') this.zoom(1.25);
     });
     // A scope that has nothing to say is not there; the first two are, to say so.
-    element.hidden = panel.limits === undefined || title === 'Force';
+    element.hidden = panel.limits === undefined || panel.isLate === true;
     return { ...panel, canvas, values, element };
   }
 

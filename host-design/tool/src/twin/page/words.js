@@ -7,3 +7,5 @@ export function inPieces(text) {
 
 // The same as text alone, where nothing else is possible.
 export const plain = (text) => text.replaceAll('`', '');
+
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

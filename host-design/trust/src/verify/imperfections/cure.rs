@@ -81,7 +81,10 @@ impl<'a> Cures<'a> {
         let rig = Rig { robust: Some(tolerances), ..self.rig.clone() };
         let mut table = self.table.clone();
         table.thresholds = TableValues::of_uncertified(&rig, &self.own).ok()?.thresholds;
-        Some((format!("robust.{key} = {}", significant(size, 2)), table))
+        Some((
+            format!("{} = {}", self.rig.base().path(&format!("robust.{key}")), significant(size, 2)),
+            table,
+        ))
     }
 
     /// `[kalman]` with more noise of the cart's input and of the joints, by these factors, which changes the observer,
@@ -98,6 +101,9 @@ impl<'a> Cures<'a> {
         let changed = TableValues::of_uncertified(&rig, &design).ok()?;
         let mut table = self.table.clone();
         (table.observer, table.thresholds) = (changed.observer, changed.thresholds);
-        Some((format!("{} times kalman.{name}", force.max(joints)), table))
+        Some((
+            format!("{} times {}", force.max(joints), self.rig.base().path(&format!("kalman.{name}"))),
+            table,
+        ))
     }
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use upright::table::Law;
 
 use upright_design::number::significant;
-use upright_design::rig::{IMPERFECTIONS, Imperfection, Rig};
+use upright_design::rig::{Base, Imperfection, Rig};
 use upright_design::simulate::{Disturbance, FallKind};
 
 /// Settings of the search for the sizes.
@@ -173,19 +173,20 @@ impl LeftOut {
     /// Those of a rig.
     pub fn of(rig: &Rig) -> Vec<Self> {
         let reason = |one: &Imperfection| Some(Self { key: one.key, reason: one.not_on(rig)? });
-        IMPERFECTIONS.iter().filter_map(reason).collect()
+        Imperfection::of_base(rig.base()).iter().filter_map(reason).collect()
     }
 }
 
 impl SizeRuns {
     /// How many survive, as text: the controller alone, too, if the firmware turns the motor off in some.
-    pub fn text(&self) -> String {
+    pub fn text(&self, base: Base) -> String {
         let Self { runs, survived, stayed_on, peak_angle_rad, peak_position_m, .. } = self;
         let off = self.ended_by.map_or(String::new(), |kind| format!(" ({kind})"));
         let alone =
             if survived == stayed_on { String::new() } else { format!("; the controller alone {survived}") };
         format!(
-            "{stayed_on} of {runs} survive{off}{alone}, up to {peak_angle_rad:.3} rad and {peak_position_m:.3} m"
+            "{stayed_on} of {runs} survive{off}{alone}, up to {peak_angle_rad:.3} rad and {peak_position_m:.3} {}",
+            base.position().unit
         )
     }
 }
