@@ -25,11 +25,11 @@ export const isHomed = ({ state, against_arming: against }) => (
 // time it lapses, because a motor does not begin to move long after it was asked to.
 export class Wish {
   constructor(ask) {
-    Object.assign(this, { ask, name: null, lapsed: null, isSimulated: false, since: 0, asked: 0 });
+    Object.assign(this, { ask, name: null, lapsed: null, isSimulated: false, since: 0, asked: -Infinity });
   }
 
   set(name, isSimulated) {
-    Object.assign(this, { name, isSimulated, lapsed: null, since: performance.now(), asked: 0 });
+    Object.assign(this, { name, isSimulated, lapsed: null, since: performance.now(), asked: -Infinity });
     if (isSimulated) this.ask(hand(name === 'up' ? 'free' : 'upright'));
   }
 
