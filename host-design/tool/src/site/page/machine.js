@@ -21,10 +21,10 @@ const without = (section, names) => names.map((name) => [`${section}.${name}`, n
 // The values of keys with which the rig gets another drive; `is` says what its file has. Keys are those of a cart: an arm's
 // file is written with its own.
 function driveOf(kind, is) {
+  const begin = BEGIN[is.base.noun];
   const field = (key, otherwise) => is.fields.find((one) => one.on_cart === key)?.value ?? otherwise;
   const force = field('actuator.force_limit_n', begin.force_n);
   const isStepper = kind === 'stepper';
-  const begin = BEGIN[is.base.noun];
   const values = [...without('actuator', ['kind', ...MOTOR_KEYS, ...STEPPER_KEYS])];
   if (isStepper) {
     values.push(...without('actuator', ['force_limit_n', 'driver_lag_s']), ['cart.encoder_step_m', null], ['cart.encoder_counts_per_rev', null], ['tick.delay_ticks', null], ['limits.jog_force_n', null],
