@@ -28,6 +28,8 @@ pub(crate) fn until(browser: &mut Browser, expression: &str) {
     let begin = Instant::now();
     while browser.value(&format!("Boolean(!upright.isBusy() && ({expression}))")) != true {
         let told = browser.value("document.getElementById('told').textContent");
+        // A script that has stopped computes nothing more.
+        assert_eq!(browser.errors(), Vec::<String>::new(), "before {expression}");
         assert!(begin.elapsed() < PATIENCE, "never: {expression}; {told}");
         std::thread::sleep(Duration::from_millis(50));
     }
