@@ -272,9 +272,10 @@ export class RigView {
     for (const [dx, dy] of [[0, -9], [9, 0], [0, 9], [-9, 0]]) draw.lineTo(px + dx, y + dy);
     draw.fill();
     draw.font = '600 13px system-ui, sans-serif';
-    const isRight = px < this.parts().right - 140;
-    draw.textAlign = isRight ? 'left' : 'right';
-    draw.fillText(`set-point ${setpoint.toFixed(2).replace('-', '−')} ${this.hello.base.position[1]}`, px + (isRight ? 14 : -14), y + 5);
+    // Beside it where there is room, else below.
+    const side = px < this.parts().right - 140 ? 1 : px > 140 ? -1 : 0;
+    draw.textAlign = ['right', 'center', 'left'][side + 1];
+    draw.fillText(`set-point ${setpoint.toFixed(2).replace('-', '−')} ${this.hello.base.position[1]}`, px + 14 * side, y + (side === 0 ? 26 : 5));
   }
 
   // Where the tip has been.
