@@ -4,7 +4,8 @@ use super::chip::{Chip, uf2_with_motions};
 use super::recorded::recorded;
 use super::{by_hand, no_defect};
 use crate::published::rig_and_table_with_motions;
-use upright_tool::image::LinkedImage;
+use upright::boards::named;
+use upright_tool::image::{LinkedImage, build_for};
 
 type Operation = fn(f32, f32) -> f32;
 
@@ -76,7 +77,9 @@ fn first_difference(pairs: &[(f32, f32)], results: &[f32], operation: Operation)
 fn sums_and_products_in_the_image_are_the_hosts() {
     let (rig, table) = rig_and_table_with_motions("single-quanser-ip02");
     let Some(uf2) = uf2_with_motions(rig, table) else { return };
-    let image = LinkedImage::read(&uf2.with_extension("elf")).unwrap();
+    // The symbols of the code are in the compiled image alone.
+    let compiled = build_for(named("pico").unwrap(), rig, table).unwrap();
+    let image = LinkedImage::read(&compiled.elf).unwrap();
     let address = |name| image.address_of(name).unwrap();
     let mut chip = Chip::start(&uf2, table.sensors());
     // After the first ticks, the code is in RAM.

@@ -68,12 +68,10 @@ where
 {
     let target_directory = base_directory()?.join(target.folder);
     let mut compiler = if target.names.iter().all(|name| rustup_has(name)) {
-        Compiler {
-            program: "cargo",
-            version: version("rustc"),
-            cargo: Command::new("cargo"),
-            target_directory,
-        }
+        let mut cargo = Command::new("cargo");
+        // With it, symbols have other names, and functions another order.
+        cargo.env_remove("RUSTC_BOOTSTRAP");
+        Compiler { program: "cargo", version: version("rustc"), cargo, target_directory }
     } else if debian_has_a_compiler(target.linker) {
         let mut cargo = Command::new(DEBIAN_CARGO);
         cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", DEBIAN_RUSTC).arg(target.libraries);
