@@ -89,6 +89,7 @@ class Labs {
     const { lab } = this;
     this.number = number;
     const [step, done] = [lab.step[number], this.stepOf(lab, number)];
+    const { hints = [] } = step;
     byId('step-number').textContent = `step ${number + 1} of ${lab.step.length}`;
     byId('step-before').disabled = number === 0;
     byId('step-after').disabled = number === lab.step.length - 1;
@@ -96,8 +97,8 @@ class Labs {
     byId('answer-place').hidden = step.task.kind === 'rig';
     byId('answer-unit').textContent = step.task.unit ?? '';
     byId('answer').value = done.is_right ? done.answer.join(' ') : '';
-    byId('hints').replaceChildren(...step.hints.slice(0, done.hints).map((text) => element('li', {}, ...inPieces(text))));
-    byId('hint').hidden = done.hints >= step.hints.length;
+    byId('hints').replaceChildren(...hints.slice(0, done.hints).map((text) => element('li', {}, ...inPieces(text))));
+    byId('hint').hidden = done.hints >= hints.length;
     this.say(done.is_right ? `✓ ${step.see}` : '', done.is_right ? 'good' : '');
   }
 
