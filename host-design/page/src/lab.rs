@@ -115,10 +115,19 @@ pub(crate) fn shown(text: &str) -> Result<Value, String> {
             }
         }
         step.as_object_mut().map(|step| step.remove("tested"));
+        or_none(step, "hints");
         tasks.push(step["task"].clone());
     }
     shown["sum"] = json!(sum_of(&json!([shown["title"], shown["rig"], shown["vary"], tasks])));
+    or_none(&mut shown, "vary");
     Ok(shown)
+}
+
+/// Puts an empty list where a lab leaves one out.
+fn or_none(value: &mut Value, key: &str) {
+    if value[key].is_null() {
+        value[key] = json!([]);
+    }
 }
 
 fn parsed(text: &str) -> Result<Value, String> {

@@ -71,7 +71,7 @@ class Labs {
   async open(lab) {
     const example = examples.find(({ name }) => name === lab.rig);
     if (example === undefined) return notice(`The lab needs the rig ${lab.rig}, which this page does not have.`, {}, true);
-    const { toml, failed } = await this.ask({ ask: 'vary', toml: example.toml, vary: lab.vary ?? [], seed: this.kept.seed });
+    const { toml, failed } = await this.ask({ ask: 'vary', toml: example.toml, vary: lab.vary, seed: this.kept.seed });
     if (failed !== undefined) return notice(failed.why, {}, true);
     Object.assign(this, { lab, rig: toml });
     const first = lab.step.findIndex((_, number) => !this.stepOf(lab, number).is_right);
@@ -89,7 +89,6 @@ class Labs {
     const { lab } = this;
     this.number = number;
     const [step, done] = [lab.step[number], this.stepOf(lab, number)];
-    const { hints = [] } = step;
     byId('step-number').textContent = `step ${number + 1} of ${lab.step.length}`;
     byId('step-before').disabled = number === 0;
     byId('step-after').disabled = number === lab.step.length - 1;
@@ -97,8 +96,8 @@ class Labs {
     byId('answer-place').hidden = step.task.kind === 'rig';
     byId('answer-unit').textContent = step.task.unit ?? '';
     byId('answer').value = done.is_right ? done.answer.join(' ') : '';
-    byId('hints').replaceChildren(...hints.slice(0, done.hints).map((text) => element('li', {}, ...inPieces(text))));
-    byId('hint').hidden = done.hints >= hints.length;
+    byId('hints').replaceChildren(...step.hints.slice(0, done.hints).map((text) => element('li', {}, ...inPieces(text))));
+    byId('hint').hidden = done.hints >= step.hints.length;
     this.say(done.is_right ? `✓ ${step.see}` : '', done.is_right ? 'good' : '');
   }
 
